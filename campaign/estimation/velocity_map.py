@@ -27,6 +27,7 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.curve_misfit import CurveMisfit, curve_misfit
 from campaign.estimation.gate import USELESS, admitted, mattering, refused
 from campaign.estimation.intervals import shifted_by, student, with_error
 from campaign.estimation.least_squares import (
@@ -76,6 +77,9 @@ FEWEST_BELOW = 3
 FAR = 3.0
 """times vs, where a twentieth of the fall from Ts is left (delta = 1): without a speed beyond that
 Tc is extrapolated."""
+BRANCH = 3.0
+"""lengths of a misfit that speeds reach above vs, for Tc and viscous friction: one more than
+these two, as in `curve_misfit`. Below that, what is left of the fall looks like them."""
 EXTRAPOLATED = Cause("extrapolated", "{symbol} is extrapolated: {why}")
 FEW_BELOW = Cause("too few speeds below vs", "{counted} below vs")
 NONE_ABOVE = Cause("no speed far above vs", "no speed is above {times:g} times vs")
@@ -85,6 +89,9 @@ NO_EFFECT = Cause("no Stribeck effect", "the points do not show a Stribeck effec
 SEARCH_ENDED = Cause("at search limit", "the search ended at {value:.3g}, its {side} limit")
 EXPONENT_ENDED = Cause(
     "exponent at search limit", "the exponent ended at {value:.3g}, its {side} limit, and moves it"
+)
+MISFIT_ABOVE = Cause(
+    "misfit above vs", "the curve does not fit, and no speed is above {times:.2g} times vs"
 )
 NEGATIVE = Cause("negative by the data", "the data would have it negative")
 LIKE_VISCOUS = Cause(
@@ -108,6 +115,7 @@ class DirectionFit:
         scatters: how points deviate beyond that; by the larger, where they do not tell which.
         fits: by model.
         lack_of_fit: p-value of `free` against repeated points; None without repeats.
+        curve_misfit: what residuals of `free` have in common; None where that is nothing.
     """
 
     place: Array
@@ -117,6 +125,7 @@ class DirectionFit:
     scatters: tuple[Scatter, ...]
     fits: Mapping[Model, StribeckFit]
     lack_of_fit: float | None = None
+    curve_misfit: CurveMisfit | None = None
 
     @property
     def freedom(self) -> int:
@@ -180,10 +189,27 @@ class DirectionFit:
         Where no Stribeck effect shows, a line describes the points as well: the truth is anywhere
         between the two (rectangular distribution; GUM, 4.3.7).
         """
-        line = self.fits["none"]
+        line, moved = self.fits["none"], self.misfit_part(model, name)
         if model == "none" or self.shows_stribeck_effect or name not in line.free:
+            return moved
+        between = abs(self.fits[model].values[name] - line.values[name]) / math.sqrt(3.0)
+        return math.hypot(between, moved)
+
+    def misfit_part(self, model: Model, name: str) -> float:
+        """What a misfit can have moved a parameter by (1 sigma, in its unit)."""
+        found, misfit = self.fits[model], self.curve_misfit
+        if misfit is None or name not in found.free:
             return 0.0
-        return abs(self.fits[model].values[name] - line.values[name]) / math.sqrt(3.0)
+        return misfit.moves(found.influence[found.free.index(name)] * found.deviation)
+
+    def misfit_above(self, model: Model, name: str) -> Reason:
+        """Why Tc or viscous friction is open beside a misfit; none where speeds reach far."""
+        misfit = self.curve_misfit
+        if misfit is None or model == "none" or not self.shows_stribeck_effect:
+            return NONE
+        needed = math.exp(BRANCH * misfit.length) * self.fits[model].values["stribeck_velocity"]
+        near = name in ("coulomb_torque", "viscous_friction") and self.speed.max() < needed
+        return MISFIT_ABOVE(times=math.exp(BRANCH * misfit.length)) if near else NONE
 
 
 def extrapolated(parameter: str, speed: Array, velocity: float) -> Reason:
@@ -245,7 +271,8 @@ def fit_direction(
     part = scatters[0].part(means, level)
     lacking = lack_of_fit(torque, level, part, member, free.residuals, len(level) - len(free.free))
     named = means if repeat_of is None else np.asarray(shared, dtype=float)
-    return DirectionFit(named, means, level, scatter, scatters, fits, lacking)
+    misfit = curve_misfit(means, free.residuals / free.deviation, free.influence * free.deviation)
+    return DirectionFit(named, means, level, scatter, scatters, fits, lacking, misfit)
 
 
 def direction_estimates(
@@ -292,6 +319,8 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
     if ended and name in _moved_by_exponent(fit):
         reason = EXPONENT_ENDED(value=found.values["stribeck_exponent"], side=ended)
         return refused(Estimate(name, value, unit, method=method), reason)
+    if reason := fit.misfit_above(model, name):
+        return refused(Estimate(name, value, unit, method=method), reason)
     if name in found.bounds:
         return _at_bound(fit, model, name, method)
     if name in found.open:
@@ -299,7 +328,7 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
     told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
     if is_bent(fit, model, name):
-        return _by_profile(fit, model, told)
+        told = _by_profile(fit, model, told)
     form = fit.form_part(model, name)
     return shifted_by(told, FORM, form) if form else told
 
@@ -373,7 +402,7 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
         # held Tc in 22 % of such maps.
         told = Estimate(name, value, unit, method=method)
         return refused(told, LIKE_VISCOUS())
-    return Estimate(
+    told = Estimate(
         name,
         value,
         unit,
@@ -382,6 +411,8 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
         method=f"at its bound; one-sided by profile likelihood, t({fit.freedom})",
         origin=Origin.AT_BOUND,
     )
+    moved = fit.misfit_part(model, name)
+    return shifted_by(told, FORM, moved) if moved else told
 
 
 def shifts(found: StribeckFit, torque_shift: Array) -> dict[str, float]:
@@ -416,4 +447,9 @@ def doubts(fit: DirectionFit) -> Iterator[str]:
         yield (
             f"repeated points scatter less than they deviate from the curve (p = "
             f"{fit.lack_of_fit:.2g}): Equation 4.6 is not all there is"
+        )
+    if fit.curve_misfit is not None:
+        yield (
+            f"residuals of neighboring speeds are alike (p = {fit.curve_misfit.p:.2g}): the "
+            "points do not follow Equation 4.6, and intervals include that"
         )

@@ -35,10 +35,10 @@ TOO_LONG = Cause(
 
 
 def suitable(experiment: Experiment, trials: Sequence[TrialData]) -> tuple[list[TrialData], str]:
-    """Of recorded trials, those that the experiment's model can use; where none, why."""
+    """Recorded trials that the experiment's model can use; without any, the reason."""
     if experiment.model.suits is not None:
-        found, why = experiment.model.suits(trials)
-        return list(found), why
+        usable, why = experiment.model.suits(trials)
+        return list(usable), why
     needed = experiment.requires.keys()
     own = [t for t in trials if t.trial.kind == experiment.name and needed <= t.channel_names()]
     channels = f" with {' and '.join(needed)}" if needed else ""
@@ -46,10 +46,10 @@ def suitable(experiment: Experiment, trials: Sequence[TrialData]) -> tuple[list[
 
 
 def result_of(experiment: Experiment, data: TestData) -> Result:
-    """What the analysis finds, with a note on every trial and channel that it had to do without.
+    """Result of the analysis, with notes on missing trials and channels.
 
-    Of a test that sweeps the seed of its bench's scatter each draw is analysed by itself. Metrics
-    of trials of other kinds, which a model may suit, are those of other analyses, and not used.
+    A test that sweeps the seed of its bench's scatter is analysed draw by draw. Metrics of trials
+    of other kinds, which a model may suit, belong to other analyses and are not used.
     """
     with axis_terms(sides_in(data.trials[0].trial.bench) if data.trials else BOTH_ROTARY):
         draws = draws_of(item.trial for item in data.trials) if data.model is None else ()
@@ -62,9 +62,9 @@ def _result_of(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> 
     if data.model is not None:
         data = replace(data, trials=tuple(_own(experiment, item) for item in data.trials))
     doubted_of = [(item, _doubt(experiment, item)) for item in data.trials]
-    before = tuple(found for _, found in doubted_of if found)
+    before = tuple(defect for _, defect in doubted_of if defect)
     usable = with_named_tables(
-        _without(data, [item for item, found in doubted_of if found and found.fatal])
+        _without(data, [item for item, defect in doubted_of if defect and defect.fatal])
     )
     result = EMPTY
     if usable.trials or not data.trials:
@@ -80,20 +80,20 @@ def _result_of(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> 
 
 
 def analysed(experiment: Experiment, data: TestData) -> Result:
-    """What an analysis finds; a trial that cannot be measured costs no more than itself.
+    """Result of an analysis, with doubts about trials that cannot be measured.
 
-    Raises what the analysis raises, and ValueError where a model has no trial left.
+    Raises what the analysis raises, and ValueError if a model has no trial left.
     """
     good, doubts = _measured_trials(experiment, data)
     if doubts and not any(good.completed()):
-        if data.model is not None:  # who asks for parameters is told why there are none
+        if data.model is not None:  # `identify` reports the reason
             raise ValueError(doubts[0].reason.text)
         return Result(doubts=doubts)
     return replace(experiment.analyse(good), doubts=doubts)
 
 
 def _without(data: TestData, lost: Sequence[TrialData]) -> TestData:
-    """The same without some of its trials."""
+    """Test data without the lost trials, which are then left out."""
     gone = {id(item) for item in lost}
     kept = tuple(item for item in data.trials if id(item) not in gone)
     return replace(data, trials=kept, left_out=(*data.left_out, *(item.trial for item in lost)))
@@ -102,28 +102,28 @@ def _without(data: TestData, lost: Sequence[TrialData]) -> TestData:
 def _measured_trials(
     experiment: Experiment, data: TestData
 ) -> tuple[TestData, tuple[RecordingDoubt, ...]]:
-    """The trials with their metrics, and why others cannot be measured.
+    """Trials with their metrics, and doubts about trials that cannot be measured.
 
-    A model that says which trials suit it measures them itself.
+    A model that selects its trials (`suits`) measures them itself.
     """
     if experiment.measure is None or not _is_own(experiment, data):
         return data, ()
     doubts: list[RecordingDoubt] = []
     lost: list[TrialData] = []
-    found: dict[int, TrialData] = {}
+    with_metrics: dict[int, TrialData] = {}
     for item in data.completed():
         if item.estimates:
             continue
         try:
             estimates = tuple(map(in_axis_units, experiment.measure(item)))
-            found[id(item)] = _Instead(item, item.trial.point, estimates)
+            with_metrics[id(item)] = _Instead(item, item.trial.point, estimates)
         except (ArchiveError, UsageError):
             raise
         except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, of one trial
             doubts.append(not_measured(item.trial, error))
             lost.append(item)
     good = _without(data, lost)
-    trials = tuple(found.get(id(item), item) for item in good.trials)
+    trials = tuple(with_metrics.get(id(item), item) for item in good.trials)
     return replace(good, trials=trials), tuple(doubts)
 
 
@@ -133,7 +133,7 @@ def _is_own(experiment: Experiment, data: TestData) -> bool:
 
 
 def _failures(experiment: Experiment, data: TestData) -> Iterator[str]:
-    """A sentence when trials are missing from the analysis."""
+    """Sentence on failed trials that the analysis leaves out."""
     failed = sum(item.ending.outcome != "completed" for item in data.trials)
     if failed and _is_own(experiment, data) and not experiment.uses_failed:
         yield (
@@ -143,7 +143,7 @@ def _failures(experiment: Experiment, data: TestData) -> Iterator[str]:
 
 
 def _lacking(experiment: Experiment, data: TestData) -> Iterator[str]:
-    """Channels that were not recorded, with what there is none of, and samples not kept."""
+    """Sentences on channels without a recording, with the lost result, and on samples not kept."""
     lacking: dict[str, None] = {}
     for item in data.trials:
         own = data.model is None or item.trial.kind == experiment.name
@@ -156,9 +156,9 @@ def _lacking(experiment: Experiment, data: TestData) -> Iterator[str]:
 
 
 def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
-    """What a recording says by itself, of an experiment that measures.
+    """Metrics of one recording; empty for an experiment without `measure`.
 
-    Raises ValueError with a message for the user where it says nothing, or cannot.
+    Raises ValueError with a message for the user if the recording is defective or has none.
     """
     wrong = _doubt(experiment, data)
     if wrong and wrong.fatal:
@@ -170,7 +170,7 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
 
 
 def lost_without(experiment: Experiment, name: str) -> str:
-    """What there is none of without a channel that the experiment can use."""
+    """Result that is missing without a channel that the experiment can use."""
     return experiment.can_use.get(name, "result that needs it")
 
 
@@ -182,9 +182,9 @@ def _own(experiment: Experiment, data: TrialData) -> TrialData:
 
 
 def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
-    """Why a recording is not analysed; of one that is too long no sample is read to find out.
+    """Doubt about a recording, or None; the check of its length reads no sample.
 
-    A model that suits trials of other kinds looks at them itself.
+    A model that suits trials of other kinds checks them itself.
     """
     if data.trial.kind != experiment.name:
         return None
@@ -196,7 +196,7 @@ def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
 
 
 def with_named_tables(data: TestData) -> TestData:
-    """The same, with a name in place of each swept value that is a table (`table_names`)."""
+    """Test data with a name in place of each swept value that is a table (`table_names`)."""
     swept = [value for item in data.trials for value in item.trial.point.values()]
     names = table_names(swept)
     if not names:
@@ -212,7 +212,7 @@ def with_named_tables(data: TestData) -> TestData:
 
 
 def _of_draws(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> Result:
-    """Each draw of a random bench, as if nothing but that draw had been executed."""
+    """Merged results of the draws of a random bench, each analysed alone."""
     parts = {}
     for seed in draws:
         points = (
@@ -227,7 +227,7 @@ def _of_draws(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> R
 
 
 def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
-    """What one draw found; one whose analysis fails costs no more than itself."""
+    """Result of one draw; a failed analysis gives a note."""
     if not part.trials:
         return EMPTY
     try:
@@ -235,17 +235,17 @@ def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
     except (ArchiveError, UsageError):
         raise
     except Exception as error:  # noqa: BLE001 - a fit may wander with one draw of many
-        told = f"{type(error).__name__}: {error}"
-        return Result(notes=(f"The draw of seed {seed} could not be analysed: {told}.",))
+        message = f"{type(error).__name__}: {error}"
+        return Result(notes=(f"The draw of seed {seed} could not be analysed: {message}.",))
 
 
 def _with_points(data: TestData, moved: Iterable[tuple[TrialData, Mapping[str, Any]]]) -> TestData:
-    """These trials, each at another point of the sweep."""
+    """Test data of these trials, each at its new point of the sweep."""
     return replace(data, trials=tuple(_Instead(*each) for each in moved))
 
 
 class _Instead:
-    """A trial told to be at another point of the sweep, or measured; all else is as it was."""
+    """A trial with another point of the sweep, or with other metrics; the rest is unchanged."""
 
     def __init__(
         self,

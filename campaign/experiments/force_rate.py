@@ -1,9 +1,9 @@
 """Breakaway force against the rate of the applied force.
 
-A torque ramp acts on the free load from outside, as an ideal force would: there is no drive. The
-breakaway torque is the largest friction before the load slides. Static models know no rate; in the
-LuGre model the bristles have less time to reach their static deflection. Figure 2.8, after Johannes
-et al. as Canudas de Wit et al. (1995) show it.
+An external torque ramp acts on the free load as an ideal force, without a drive. The breakaway
+torque is the largest friction before the load slides. Static models do not depend on the rate; in
+the LuGre model the bristles have less time to reach their static deflection. Figure 2.8, after
+Johannes et al., from Canudas de Wit et al. (1995).
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ from campaign.units import AngularRate, Torque, TorqueRate
 
 OWN = ("torque_rate",)
 SAMPLES = 4000
-"""of the shortest ramp: its peak is then known to a part in thousands."""
+"""Fewest samples of a ramp, which resolve its peak to a part in thousands."""
 SLOWEST_RECORDING = 1000.0
-"""Hz, for the slow ramps: the breakaway itself is as quick there."""
+"""Lowest sample rate (Hz): breakaway is equally fast on slow ramps."""
 STEP = 2e-3
-"""of a torque: what the time step of a simulation may change it by."""
+"""Relative change of a torque that the time step of a simulation may cause."""
 
 
 class ForceRateOptions(Options):
@@ -79,7 +79,7 @@ def _trials(options: ForceRateOptions, bench: Bench) -> Iterator[TrialRequest]:
             duration = options.peak_torque / rate
             yield TrialRequest(
                 Task(
-                    mode="spring",  # of no stiffness: a load that nothing but the ramp pushes
+                    mode="spring",  # of no stiffness: only the ramp moves the load
                     disturbance=Polyline(times=(0.0, duration), values=(0.0, options.peak_torque)),
                     duration=duration,
                     window=(0.0, duration),
@@ -109,10 +109,10 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
 
 
 def _breakaway(friction: Array, slides: int, at: int) -> Estimate:
-    """The largest friction (N m) before sample `slides`, which is that at sample `at`.
+    """Largest friction (N m) before sample `slides`, that of sample `at`.
 
-    A fast ramp has the load slide, by its rate, while friction still rises: between the last sample
-    before that and the first one after.
+    On a fast ramp the load reaches the sliding rate while friction still rises: the peak is then
+    between the last sample before and the first one after.
     """
     if at == slides - 1 and friction[slides] > friction[at]:
         ends = float(friction[at]), float(friction[slides])
@@ -123,7 +123,7 @@ def _breakaway(friction: Array, slides: int, at: int) -> Estimate:
 
 @dataclass(frozen=True)
 class _Breakaway:
-    """At one rate of the applied torque (N m/s), repeats together."""
+    """Breakaway at one rate of the applied torque (N m/s), repeats combined."""
 
     torque_rate: float
     breakaway: Estimate
@@ -132,21 +132,21 @@ class _Breakaway:
 
 def _breakaways(place: ConditionGroup) -> Iterator[_Breakaway]:
     for rate, trials in place.by("torque_rate").items():
-        found = combined(trials, _measure)
-        yield _Breakaway(rate, found["breakaway_torque"], found["applied_torque"])
+        estimates = combined(trials, _measure)
+        yield _Breakaway(rate, estimates["breakaway_torque"], estimates["applied_torque"])
 
 
 def _analyse(data: TestData) -> Result:
-    found = places(data.completed(), OWN)
-    if not found:
+    groups = places(data.completed(), OWN)
+    if not groups:
         return Result()
-    rows = {place.label: (place, list(_breakaways(place))) for place in found}
+    rows = {place.label: (place, list(_breakaways(place))) for place in groups}
     every = [(place, row) for place, own in rows.values() for row in own]
     table = Table(
         key="force-rate",
         title="Breakaway torque by rate of the applied torque",
         columns=(
-            *found[0].columns,
+            *groups[0].columns,
             Column("torque_rate", "Rate of the applied torque", "N m/s", "N m/s", exact=True),
             Column("breakaway", "Breakaway torque", "N m", "N m"),
             Column("applied", "Applied torque at that moment", "N m", "N m"),
@@ -165,16 +165,16 @@ def _analyse(data: TestData) -> Result:
 def _figure(rows: dict[str, tuple[ConditionGroup, list[_Breakaway]]]) -> Figure:
     peaks: list[Curve] = []
     histories: dict[str, list[Curve]] = {}
-    told: list[str] = []
+    sentences: list[str] = []
     items: list[TrialData] = []
     for label, (place, own) in rows.items():
         series = model_series(str(place.point.get("model", label or "measured")))
         rates = np.array([row.torque_rate for row in own])
-        found = [row.breakaway for row in own]
-        peaks.append(Curve.of(rates, found, label, series, "line+points"))
+        torques = [row.breakaway for row in own]
+        peaks.append(Curve.of(rates, torques, label, series, "line+points"))
         for title, curve in _histories(place, own, label, series):
             histories.setdefault(title, []).append(curve)
-        told.append(_what_shows(own, label))
+        sentences.append(_what_shows(own, label))
         items += place.trials
     top = max(float(curve.y.max()) for curve in peaks)
     applied = Axis("Applied torque", "N m", "N m", limits=(0.0, 1.6 * top))
@@ -186,7 +186,7 @@ def _figure(rows: dict[str, tuple[ConditionGroup, list[_Breakaway]]]) -> Figure:
     return Figure(
         key="force-rate",
         title="Breakaway torque over the rate of the applied torque",
-        caption=f"{' '.join(told)} Behind: friction during {ramps}. On the dotted line "
+        caption=f"{' '.join(sentences)} Behind: friction during {ramps}. On the dotted line "
         "friction holds the load; below it the load gains speed.",
         alt="Breakaway torque over torque rate on a logarithmic axis, and friction torque over "
         "applied torque for the slowest and the fastest ramp.",
@@ -209,7 +209,7 @@ def _figure(rows: dict[str, tuple[ConditionGroup, list[_Breakaway]]]) -> Figure:
 
 
 def _what_shows(rows: list[_Breakaway], label: str) -> str:
-    """How the breakaway torque changes from the slowest to the fastest ramp, if it does."""
+    """Caption sentence: breakaway torque of the slowest and of the fastest ramp."""
     first, last = rows[0], rows[-1]
     who = f"{label}: breakaway" if label else "breakaway"
     torques = [amount(row.breakaway.value, "N m") for row in (first, last)]
@@ -218,14 +218,14 @@ def _what_shows(rows: list[_Breakaway], label: str) -> str:
         return sentence(f"{who} at {torques[0]} where the torque rises by {rates[0]}")
     if not _apart(first.breakaway, last.breakaway):
         return sentence(f"{who} at {torques[0]}, at {rates[0]} as at {rates[1]}")
-    way = "falls" if last.breakaway.value < first.breakaway.value else "rises"
-    return sentence(f"{who} {way} from {torques[0]} at {rates[0]} to {torques[1]} at {rates[1]}")
+    change = "falls" if last.breakaway.value < first.breakaway.value else "rises"
+    return sentence(f"{who} {change} from {torques[0]} at {rates[0]} to {torques[1]} at {rates[1]}")
 
 
 def _apart(one: Estimate, other: Estimate) -> bool:
-    """Whether two breakaway torques differ by more than both intervals and a part in a thousand.
+    """Whether two breakaway torques differ by more than their intervals and the share `STEP`.
 
-    A simulation's time step may change them by that, which no interval has in it.
+    A simulation's time step may change them by that share, which no interval includes.
     """
     halves = [each.half_width for each in (one, other) if each.has_interval]
     scatter = math.hypot(*(half for half in halves if math.isfinite(half)))
@@ -235,9 +235,9 @@ def _apart(one: Estimate, other: Estimate) -> bool:
 def _histories(
     place: ConditionGroup, rows: list[_Breakaway], label: str, series: str
 ) -> Iterator[tuple[str, Curve]]:
-    """Friction over applied torque of the slowest and of the fastest ramp, each with its panel.
+    """Friction over applied torque of the slowest and the fastest ramp, each with a panel title.
 
-    One panel would show two curves of one look for each model.
+    A common panel would show two equal-looking curves for each model.
     """
     rates = list(dict.fromkeys((rows[0].torque_rate, rows[-1].torque_rate)))
     titles = ("Slowest ramp", "Fastest ramp") if len(rates) == 2 else ("Ramp",)

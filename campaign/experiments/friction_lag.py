@@ -54,10 +54,10 @@ METRICS = {
     "friction_lag_widest": "N m",
     "friction_lag_area": "N m rad/s",
 }
-"""What one recording tells, and in which units."""
+"""Metrics of one recording, with their units."""
 COLUMNS = ("frequency", "width", "widest", "area")
 PER_CYCLE = 400
-"""Samples, and straight pieces of the prescribed rate, in a cycle."""
+"""Samples, and linear segments of the prescribed rate, in a cycle."""
 
 SLOW = 0.01
 """rad/s; rates up to here are shown in mrad/s."""
@@ -111,7 +111,7 @@ def cycle_windows(options: FrictionLagOptions, frequency: float) -> tuple[Window
 
 
 def swing(options: FrictionLagOptions, frequency: float) -> Polyline:
-    """From rest up to the lowest rate within one cycle, and from there the cycles of the swing."""
+    """Rate command: from rest to the lowest rate within one cycle, then the cycles of the swing."""
     phase = np.arange(options.cycles * PER_CYCLE + 1) / PER_CYCLE
     rate = options.mean_rate - options.amplitude * np.cos(2.0 * np.pi * phase)
     times = (0.0, *((1.0 + phase) / frequency))
@@ -137,7 +137,7 @@ class Loop:
 
     @property
     def is_flat(self) -> bool:
-        """Whether friction is the same up and down: a line, which runs no way round."""
+        """Whether friction is equal for rising and falling rates: a line without a direction."""
         return self.widest.value == 0.0
 
 
@@ -158,7 +158,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
             return simulated(map(_lost, METRICS))
         shapes.append(loop_shape(rate, friction, common))
         coarse.append(loop_shape(rate[::2], friction[::2], common))
-    # Trapezoids and straight lines between samples err with the square of their distance.
+    # Errors of trapezoids and linear interpolation grow with the square of the sample step.
     errors = np.max(np.abs(np.array(coarse) - np.array(shapes)), axis=0) / 3.0
     torque = float(np.max(np.abs(friction)))
     scales = torque, torque, torque * options.amplitude
@@ -174,13 +174,13 @@ def _lost(name: str) -> Estimate:
 
 
 def _mean(name: str, values: Array, unit: str, error: float) -> Estimate:
-    """Of the cycles; `error` is that of sampling, the same in each."""
-    found = of_repeats(name, values, unit, "cycles")
-    return shifted_by(found, SAMPLES, error / math.sqrt(3.0))
+    """Mean of the cycles; `error`: of sampling, equal in each."""
+    mean = of_repeats(name, values, unit, "cycles")
+    return shifted_by(mean, SAMPLES, error / math.sqrt(3.0))
 
 
 def loop_shape(rate: Array, friction: Array, common: Array) -> tuple[float, float, float]:
-    """Of one cycle: width at the middle one of the rates `common`, largest width, and area.
+    """Width at the middle one of the rates `common`, largest width, and area of one cycle.
 
     rate, friction: shape (n,), from the lowest rate up and down again. A width is friction while
     the rate rises less friction while it falls, at the same rate.
@@ -200,27 +200,27 @@ def _closed(rate: Array, friction: Array) -> tuple[Array, Array]:
 
 
 def _loop(frequency: float, trials: Sequence[TrialData]) -> Loop:
-    found = combined(trials, _measure)
+    estimates = combined(trials, _measure)
     cut = trials[0].recording().window(*trials[0].trial.task.window)
     rate, friction = _closed(cut[LOAD_RATE], cut[FRICTION_TORQUE])
     largest = float(np.nanmax(np.abs(friction), initial=0.0))
     swing = 0.5 * float(np.ptp(trials[0].trial.task.command.sample(cut.time)))
     scales = largest, largest, largest * swing
-    told = (admitted(found.get(name) or _lost(name)) for name in METRICS)
-    return Loop(frequency, rate, friction, *map(resolved, told, scales))
+    sizes = (admitted(estimates.get(name) or _lost(name)) for name in METRICS)
+    return Loop(frequency, rate, friction, *map(resolved, sizes, scales))
 
 
 def _analyse(data: TestData) -> Result:
-    found = places(data.completed(), OWN)
-    if not found:
+    groups = places(data.completed(), OWN)
+    if not groups:
         return Result()
-    loops = [(place, [_loop(*each) for each in place.by("frequency").items()]) for place in found]
+    loops = [(place, [_loop(*each) for each in place.by("frequency").items()]) for place in groups]
     every = [(place.point, loop) for place, own in loops for loop in own]
     table = Table(
         key="friction-lag",
         title="Width of the loops of friction lag",
         columns=(
-            *found[0].columns,
+            *groups[0].columns,
             Column("frequency", "Frequency", "Hz", "Hz", exact=True),
             Column("width", "Width at the mean rate", "N m", "N m"),
             Column("widest", "Largest width", "N m", "N m"),
@@ -244,23 +244,23 @@ def _analyse(data: TestData) -> Result:
         panels=tuple(_panel(place, own) for place, own in loops),
         thesis=("2.10",),
         across=min(2, len(loops)),
-        trials=trials_of(items[0] for place in found for items in place.by("frequency").values()),
+        trials=trials_of(items[0] for place in groups for items in place.by("frequency").values()),
     )
     return Result((table,), (figure,), findings)
 
 
 def _what_shows(place: ConditionGroup, loops: list[Loop]) -> str:
-    """How wide the loops are at the mean rate, where friction lags at all: true of the figure."""
+    """Caption sentence: widths of the loops at the mean rate."""
     start = f"{place.label}: " if place.label else ""
-    told = [loop for loop in loops if math.isfinite(loop.width.value)]
-    if not told:
+    known = [loop for loop in loops if math.isfinite(loop.width.value)]
+    if not known:
         return ""
-    if all(loop.is_flat for loop in told):
+    if all(loop.is_flat for loop in known):
         return sentence(f"{start}no loop shows, friction is the same up and down")
     widths = [
-        f"{amount(loop.width.value, 'N m', digits=2)} at {loop.frequency:.4g} Hz" for loop in told
+        f"{amount(loop.width.value, 'N m', digits=2)} at {loop.frequency:.4g} Hz" for loop in known
     ]
-    higher = all(surely_above(loop.width, 0.0) for loop in told)
+    higher = all(surely_above(loop.width, 0.0) for loop in known)
     up, by = ("is higher than", " by") if higher else ("less that", ":")
     return sentence(f"{start}friction on the way up {up} on the way down{by} {listed(widths)}")
 

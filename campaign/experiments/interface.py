@@ -26,7 +26,7 @@ _Options = TypeVar("_Options", bound=Options)
 
 
 class TrialData(Protocol):
-    """A finished trial as an analysis sees it; its samples are read only when asked for."""
+    """A finished trial for an analysis; `recording` reads its samples."""
 
     @property
     def trial(self) -> Trial: ...
@@ -38,19 +38,19 @@ class TrialData(Protocol):
         """The samples. Raises ArchiveError when they cannot be read."""
 
     def channel_names(self) -> frozenset[str]:
-        """What was recorded, without reading any of it. Raises ArchiveError likewise."""
+        """Names of the recorded channels, without reading samples. Raises ArchiveError likewise."""
 
     @property
     def estimates(self) -> Sequence[Estimate]:
-        """What `Experiment.measure` found when it was executed; nothing if nobody looked then."""
+        """Metrics by `Experiment.measure` at execution; empty if not measured then."""
 
     @property
     def not_kept(self) -> str:
-        """Why it has no samples though it recorded some; empty when it has."""
+        """Why its recorded samples were not archived; empty if they were."""
 
 
 def no_progress(text: str) -> None:
-    """Reports progress to nobody."""
+    """Ignore progress."""
 
 
 def say_at(say: Callable[[str], None], step: str, text: str) -> None:
@@ -60,17 +60,17 @@ def say_at(say: Callable[[str], None], step: str, text: str) -> None:
 
 @dataclass(frozen=True)
 class TestData:
-    """All there is about one test of a run, for its analysis; or trials that a model suits.
+    """Data of one test of a run for its analysis, or of trials that suit a model.
 
     Attributes:
         options: the test's normalised options before the sweep (SI).
         trials: in plan order, failed ones included.
         model: options of the experiment's `Model`, where `campaign identify` asks for parameters;
             None in a report.
-        validation: trials that no model is fitted to, for comparison with its predictions; read
-            once, when everything is chosen.
+        validation: trials that are not fitted, for comparison with predictions; read once, after
+            all choices.
         say: reports progress.
-        left_out: trials that are not among those, as nothing can be told from their recordings.
+        left_out: further trials, which are not analysed because of their recordings.
     """
 
     name: str
@@ -84,7 +84,7 @@ class TestData:
 
     @property
     def bench(self) -> Bench:
-        """What is stated of the rig: that of the first trial."""
+        """Stated bench of the rig, from the first trial."""
         return bench_of(self.trials[0].trial)
 
     def completed(self) -> Iterator[TrialData]:
@@ -97,30 +97,30 @@ class TestData:
 
 
 def with_samples(trials: Iterable[TrialData]) -> list[TrialData]:
-    """Those whose samples are archived: time histories are drawn of them."""
+    """Trials with archived samples, for figures over time."""
     return [data for data in trials if not data.not_kept]
 
 
 @dataclass(frozen=True)
 class Stage(StageKind):
-    """Trials of one point of a test's matrix that follow from what those before them found.
+    """Trials of one point of a test's matrix that depend on results of earlier trials.
 
     Attributes:
         name: a word or two, unique within the experiment: `refinement`.
-        why: what follows from what, for the plan and the record.
-        most: what they take at most at a point, from its options and bench. The plan shows it and
-            judges its size, and nobody gets more: a stage that asks for more is not executed.
-        trials: which they are, from options and bench of the point and all of its trials so far,
-            failed ones included. Asked once, when all of those have ended; the same data gives the
-            same trials. They are numbered, checked and archived like planned ones. What it raises
-            costs the stage and not the run.
+        why: how they depend on earlier trials, for the plan and the archive.
+        most: upper bound of their trials and time at a point, from its options and bench. The plan
+            shows and checks it; a stage that exceeds it is not executed.
+        trials: the trials, from options and bench of the point and all of its trials so far, failed
+            ones included. Called once, after all of those have ended; equal data give equal trials.
+            They are numbered, checked and archived like planned ones. An exception ends the stage,
+            not the run.
     """
 
     trials: Callable[[Any, Bench, TestData], Iterable[TrialRequest]]
 
 
 Suits = Callable[[Sequence[TrialData]], tuple[Sequence[TrialData], str]]
-"""Of recorded trials, those that an analysis can use; where none, why."""
+"""Recorded trials that an analysis can use; without any, the reason."""
 
 
 @dataclass(frozen=True)
@@ -128,13 +128,12 @@ class Model:
     """How `campaign identify` uses an experiment's analysis, which gives `Result.identified`.
 
     The analysis then has `TestData.model` and `TestData.validation`, and raises ValueError with a
-    message for the user where there is no result.
+    message for the user if there is no result.
 
     Attributes:
-        name: what `--model` says.
+        name: value of `--model`.
         summary: one line for `campaign kinds`.
-        options: what it accepts, `--set NAME.option=value`; the analysis has them as
-            `TestData.model`.
+        options: of `--set NAME.option=value`; the analysis has them as `TestData.model`.
         suits: recorded trials that the analysis can use. Absent: those of the experiment itself
             that have the channels it requires.
     """
@@ -150,7 +149,7 @@ NO_MODEL = Model("", "")
 
 @dataclass(frozen=True)
 class KeyQuantity:
-    """A quantity of which findings are key numbers: those with all of these conditions."""
+    """Quantity whose findings with all of these conditions are key numbers."""
 
     quantity: str
     where: Mapping[str, Value]
@@ -166,47 +165,46 @@ class Experiment(ExperimentKind):
     """A kind of test.
 
     Attributes:
-        name: what a protocol's `kind` says.
+        name: value of `kind` in a protocol.
         summary: one line for `campaign kinds`.
-        options: what a test of this kind accepts, besides what every test accepts.
+        options: of a test of this kind, besides those of every test.
         trials: the trials of one point of the test's matrix, in the order to execute them. Raises
-            ValueError with a message for the user when options and bench do not go together.
-        analyse: tables, figures and findings of a whole test. Must cope with failed trials, and
-            with recordings that lack a channel of `can_use`.
+            ValueError with a message for the user if options and bench are not compatible.
+        analyse: tables, figures and findings of a whole test. Must accept failed trials, and
+            recordings without a channel of `can_use`.
         measure: the metrics of one recording, from its samples and its trial's windows alone; they
             are archived with the trial, and `metrics` gives them to `analyse`. Raises ValueError
-            with a message for the user when the recording holds none. Whatever it raises costs
-            that trial only: the others are analysed, and a note says which one is left out.
-        needs_samples: whether `analyse` finds less in metrics alone. Where it does not, and draws
-            time histories of `with_samples` only, a protocol may leave samples out (`keep`).
-        fit: options that a test does not write, as they suit its bench. Handed the options with
-            their plain defaults (`model_fields_set` has those written) and the bench; what it does
-            not name keeps its default.
-        requires: names of the channels without which a measurement is in vain, and what each is
-            for. A `TrialRequest` says so where its trial requires only some of them.
-        can_use: names of further channels, and what there is none of without them, in words that
-            go on after "no": `figure of the command`.
-        seeks_instability: it goes to where a loop is unstable, to find out where that is; the plan
-            of any other test with an unstable loop is refused.
-        uses_failed: its analysis uses trials that did not complete, and says which are left out; of
-            any other a note counts them.
-        perturbs_bench: its trials are on benches that it makes from the test's own, on purpose
-            (`TrialRequest.bench`); what it finds is still said of the test's bench.
-        stages: further trials of a point, which follow from those of `trials` and of the stages
-            before; nothing else may lead to trials that are not in the plan.
-        recorded: the trials that a recording from elsewhere holds, with their windows, and with the
-            part of it that each is where there are several. Raises ValueError with a message for
-            the user where it holds none. Absent: it is one trial, with the windows that whoever
-            recorded it names.
-        windows: names of the windows that its analysis looks for, where other names tell it
-            nothing; a mapping that names another is refused. Absent: whoever recorded it knows.
-        most_samples: of a recording that is looked at in one, whole channels in memory; longer ones
-            are archived and not analysed. None: however many there are.
-        warnings: what the plan should warn of, with what to do about it: sentences without a full
-            stop, of the options and the bench of a point whose trials were made. What a test's
-            points say alike is told once.
+            with a message for the user if the recording has none. Any exception affects that trial
+            only: the others are analysed, and a note states which one is left out.
+        needs_samples: whether `analyse` has fewer results from metrics alone. If not, and if it
+            draws time histories of `with_samples` only, a protocol may leave samples out (`keep`).
+        fit: defaults that depend on the bench, for options that a test omits. Takes the options
+            with plain defaults (`model_fields_set` has the written ones) and the bench; options
+            that it does not name keep their defaults.
+        requires: channels without which a measurement has no result, and the purpose of each. A
+            `TrialRequest` states its own if its trial requires only some of them.
+        can_use: names of further channels, and the result that is missing without each, in words
+            that continue after "no": `figure of the command`.
+        seeks_instability: it measures where a loop becomes unstable; the plan of any other test
+            with an unstable loop is refused.
+        uses_failed: its analysis uses trials that did not complete, and states which are left out;
+            for any other experiment a note counts them.
+        perturbs_bench: its trials are on benches that it derives from the test's own, on purpose
+            (`TrialRequest.bench`); its findings still belong to the test's bench.
+        stages: further trials of a point, which depend on those of `trials` and of the stages
+            before; only stages add trials that are not in the plan.
+        recorded: the trials in a recording of another program, with their windows, and with the
+            part of each if there are several. Raises ValueError with a message for the user if
+            there is none. Absent: it is one trial, with the windows of its mapping.
+        windows: names of the windows that its analysis reads, if other names have no meaning for
+            it; a mapping with another name is refused. Absent: any name.
+        most_samples: of a recording that is analysed as a whole, in memory; longer ones are
+            archived and not analysed. None: no limit.
+        warnings: warnings for the plan, with the remedy: sentences without a full stop, from
+            options and bench of a point whose trials were made. Equal ones of a test are shown
+            once.
         model: how `campaign identify` uses its analysis.
-        key_numbers: which findings answer what a test asks, the most important first.
+        key_numbers: findings that answer the question of a test, the most important first.
     """
 
     analyse: Callable[[TestData], Result]
@@ -223,35 +221,35 @@ class Experiment(ExperimentKind):
 def metrics(
     data: TrialData, measure: Callable[[TrialData], Sequence[Estimate]]
 ) -> dict[str, Estimate]:
-    """What one recording says, by name: as it was measured before (`analysis`), or else by now.
+    """Metrics of one recording by name: those measured before (`analysis`), else measured now.
 
-    What was not determined is not archived, and comes back as such. Raises what `measure` raises.
+    Metrics without a value are not archived, and are not determined. Raises what `measure` raises.
     """
     return Metrics({each.name: each for each in data.estimates or measure(data)})
 
 
 class Metrics(dict[str, Estimate]):
-    """Metrics by name; those that a recording does not tell are not determined."""
+    """Metrics by name; missing ones are not determined."""
 
     def __missing__(self, name: str) -> Estimate:
         return Estimate.without_interval(name, math.nan, "", NOT_TOLD())
 
 
 def bench_of(trial: Trial) -> Bench:
-    """The trial's bench as an object; of equal benches one, which nobody may change."""
+    """The trial's bench; equal benches share one object, which must not be changed."""
     return validated(Bench, trial.bench)
 
 
 def options_of(experiment: Experiment, tree: Mapping[str, Any]) -> Any:
-    """Normalised options as an object of the experiment's own class; of equal ones one."""
+    """Normalised options as an object of the experiment's class; equal ones share one object."""
     return validated(experiment.options, tree)
 
 
 def validated(kind: type[_Options], tree: Mapping[str, Any]) -> _Options:
     """A normalised tree (SI) as an object. Raises what validation raises.
 
-    The trials of a test share their bench and nearly all options, so objects are kept: by content,
-    as trees can be changed.
+    Trials of a test share their bench and most options, so objects are cached: by content, because
+    trees can be changed.
     """
     return cast("_Options", _validated(kind, to_json(tree)))
 

@@ -21,7 +21,7 @@ from campaign.trial import Role, Task, TrialRequest
 from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time
 
 LOOKED_AT = 0.1
-"""s at the end of a trial over which the reached angle is averaged."""
+"""Time (s) at the end of a trial over which the reached angle is averaged."""
 
 
 class MoveOptions(Options):
@@ -48,13 +48,13 @@ class MoveOptions(Options):
 def trapezoid(travel: float, speed: float, acceleration: float) -> tuple[float, float, float]:
     """Duration of a ramp (s), of the stretch between the ramps (s), and the rate there (rad/s).
 
-    The integral over both ramps and the stretch is `travel` (rad), whatever its sign; where the way
-    is too short for `speed` (rad/s), it is a triangle.
+    The integral over both ramps and the stretch is `travel` (rad), of either sign. A travel too
+    short for `speed` (rad/s) gives a triangle.
     """
-    way = abs(travel)
-    peak = min(speed, math.sqrt(way * acceleration))
+    distance = abs(travel)
+    peak = min(speed, math.sqrt(distance * acceleration))
     ramp = peak / acceleration
-    stretch = max(0.0, way / peak - ramp)
+    stretch = max(0.0, distance / peak - ramp)
     return ramp, stretch, math.copysign(peak, travel)
 
 
@@ -64,10 +64,10 @@ def _trials(options: MoveOptions, bench: Bench) -> Iterator[TrialRequest]:
         raise ValueError("'angle' and 'position' are equal: there is nothing to move")
     if options.role == "warm-up" and not options.cycles:
         raise ValueError("a warm-up goes to and fro: set cycles")
-    ways = [travel, -travel] * options.cycles or [travel]
+    travels = [travel, -travel] * options.cycles or [travel]
     times, values = [0.0], [0.0]
-    for way in ways:
-        ramp, stretch, rate = trapezoid(way, options.speed, options.acceleration)
+    for distance in travels:
+        ramp, stretch, rate = trapezoid(distance, options.speed, options.acceleration)
         for step, value in ((ramp, rate), (stretch, rate), (ramp, 0.0), (options.rest, 0.0)):
             times.append(times[-1] + step)
             values.append(value)
@@ -118,7 +118,7 @@ def _row(data: TrialData) -> dict[str, Cell]:
         count = bench_of(data.trial).sensors.encoder.resolution
         reached = of_series("reached", last, "rad")
         if count > 0:
-            # An axis that stands still shows one count, wherever in it the axis stands.
+            # A standing axis shows one count, for any position within that count.
             reached = shifted_by(reached, "resolution of the encoder", count / math.sqrt(12.0))
         row |= {"reached": reached, "deviation": shifted("deviation", reached, -target)}
     return row

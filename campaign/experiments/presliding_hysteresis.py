@@ -1,7 +1,7 @@
 """Presliding hysteresis: friction over small displacements, and lost energy.
 
 Below breakaway friction depends on displacement rather than on rate: it follows the displacement
-like a spring that yields, and comes back on another branch. The area of the loop is the energy lost
+like a spring that yields, and returns on another branch. The area of the loop is the energy lost
 in a cycle (Figure 2.11).
 """
 
@@ -41,11 +41,11 @@ from campaign.units import Angle, Frequency, in_words
 
 OWN = ("amplitude",)
 PER_CYCLE = 400
-"""Straight pieces of the prescribed rate in a cycle."""
+"""Linear segments of the prescribed rate in a cycle."""
 SMALL = 1e-4
-"""rad; displacements up to here are shown in microradian."""
+"""Largest displacement (rad) that is shown in microradians."""
 READABLE = 0.3
-"""of the largest amplitude: up to here a loop is shown again among its like."""
+"""Share of the largest amplitude up to which loops have a further panel."""
 
 
 class PreslidingHysteresisOptions(Options):
@@ -89,7 +89,7 @@ def _trials(options: PreslidingHysteresisOptions, bench: Bench) -> Iterator[Tria
 
 
 def windows_of(options: PreslidingHysteresisOptions) -> tuple[Window, Window]:
-    """The last two cycles, for the plan and for recordings of a plan that did not name them."""
+    """The last two cycles, for the plan and for archived trials without windows."""
     period = 1.0 / options.frequency
     stop = (0.5 + options.cycles) / options.frequency
     return (
@@ -101,8 +101,8 @@ def windows_of(options: PreslidingHysteresisOptions) -> tuple[Window, Window]:
 def strokes(options: PreslidingHysteresisOptions, amplitude: float) -> Polyline:
     """Rate from the middle to one turning point in half a period, then the cycles from there.
 
-    Begun in the middle, the loop is nearly the steady one from its first cycle; begun at a turning
-    point with straight bristles, small loops take many cycles to become symmetric.
+    With a start in the middle, the first loop is nearly the steady one. With a start at a turning
+    point and straight bristles, small loops need many cycles to become symmetric.
     """
     phase = np.arange((2 * options.cycles + 1) * PER_CYCLE // 2 + 1) / PER_CYCLE
     rate = 2.0 * np.pi * options.frequency * amplitude * np.sin(2.0 * np.pi * phase)
@@ -154,7 +154,7 @@ def _windows(data: TrialData) -> tuple[Window, ...]:
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """Sizes of the last loop; what the loop before differs by is how far it is from closed."""
+    """Sizes of the last loop; their difference from the loop before is a systematic part."""
     before, last = (_loop(data, window).sizes(_amplitude_of(data)) for window in _windows(data))
     return [
         shifted_by(
@@ -167,22 +167,24 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 
 def _analyse(data: TestData) -> Result:
-    found = places(data.completed(), OWN)
-    if not found:
+    groups = places(data.completed(), OWN)
+    if not groups:
         return Result()
-    loops = [(place, [(item, metrics(item, _measure)) for item in place.trials]) for place in found]
+    loops = [
+        (place, [(item, metrics(item, _measure)) for item in place.trials]) for place in groups
+    ]
     every = [
         ({**place.point, "amplitude": _amplitude_of(item)}, own)
         for place, items in loops
         for item, own in items
     ]
-    largest = max(_amplitude_of(item) for place in found for item in place.trials)
+    largest = max(_amplitude_of(item) for place in groups for item in place.trials)
     display, energy = ("urad", "uJ") if largest <= SMALL else ("mrad", "mJ")
     table = Table(
         key="presliding-hysteresis",
         title="Energy lost in a cycle by amplitude of the displacement",
         columns=(
-            *found[0].columns,
+            *groups[0].columns,
             Column("amplitude", "Amplitude", "rad", display, exact=True),
             Column("peak", "Largest friction torque", "N m", "N m"),
             Column("energy", "Energy per cycle", "J", energy),
@@ -194,7 +196,7 @@ def _analyse(data: TestData) -> Result:
         "dry sliding.",
     )
     findings = tuple(Finding.of(own["hysteresis_energy"], at) for at, own in every)
-    small = [amplitude for place in found for amplitude in _small(place)]
+    small = [amplitude for place in groups for amplitude in _small(place)]
     again = f" Beside them those up to {_amplitude(max(small), display)} again." if small else ""
     figure = Figure(
         key="presliding-hysteresis",
@@ -202,10 +204,10 @@ def _analyse(data: TestData) -> Result:
         caption=f"The last cycle of each amplitude, closed; arrows show which way it runs.{again} "
         + " ".join(_what_shows(place, items, display, energy) for place, items in loops),
         alt="Friction torque over displacement: one closed loop per amplitude.",
-        panels=tuple(panel for place in found for panel in _panels(place, display)),
+        panels=tuple(panel for place in groups for panel in _panels(place, display)),
         thesis=("2.11",),
         across=2,
-        trials=trials_of(item for place in found for item in place.trials),
+        trials=trials_of(item for place in groups for item in place.trials),
     )
     return Result((table,), (figure,), findings)
 
@@ -217,10 +219,10 @@ def _what_shows(
     energy: str,
 ) -> str:
     """Energy and loss factor of the smallest and the largest loop."""
-    told = [each for each in items if math.isfinite(each[1]["hysteresis_energy"].value)]
-    if not told:
+    known = [each for each in items if math.isfinite(each[1]["hysteresis_energy"].value)]
+    if not known:
         return ""
-    ordered = sorted(told, key=lambda each: _amplitude_of(each[0]))
+    ordered = sorted(known, key=lambda each: _amplitude_of(each[0]))
     parts = [
         f"{amount(own['hysteresis_energy'].value, 'J', energy)} a cycle at "
         f"{_amplitude(_amplitude_of(item), unit)} (loss factor {own['loss_factor'].value:.2g})"
@@ -231,13 +233,13 @@ def _what_shows(
 
 
 def _small(place: ConditionGroup) -> list[float]:
-    """Amplitudes (rad) of the loops that a panel of all of them shows too small to be read."""
+    """Amplitudes (rad) of the loops that are too small to read in a panel of all loops."""
     known = [_amplitude_of(item) for item in place.trials]
     return [each for each in known if each <= READABLE * max(known)]
 
 
 def _panels(place: ConditionGroup, display: str) -> Iterator[Panel]:
-    """All loops, and beside them the small ones again, on axes of their own."""
+    """Panel of all loops, and one of the small loops on axes of its own."""
     whole = _panel(place, display)
     yield whole
     small = _small(place)

@@ -1,6 +1,6 @@
 """Repeatability of the parameters of a friction-velocity map.
 
-The whole map is measured several times, on different days or simply again. Each map is fitted on
+The whole map is measured several times, on different days or in repetitions. Each map is fitted on
 its own, in both directions; every parameter then has a mean and a relative standard deviation over
 all sets and directions (Table 4.4 and section 4.3.2). The thesis counts the two directions of one
 map as two sets, so that three maps are sets 1 to 6.
@@ -54,7 +54,7 @@ from campaign.trial import canonical_json
 DOUBTFUL = Cause("doubtful values", "{doubtful} of {values} values are {origins}")
 LARGEST = Cause("largest of several", "the largest of several: each has its own interval")
 SCORED = tuple(name for name in PARAMETERS if name != "stribeck_exponent")
-"""Parameters of Table 4.4; the exponent is fitted beside them, and scatters most."""
+"""Parameters of Table 4.4; the exponent is fitted, too, and scatters most."""
 
 
 def _sets(data: TestData, notes: list[str]) -> Iterator[MapSet]:
@@ -104,21 +104,21 @@ def _by_map(sets: Sequence[MapSet], parameter: str) -> Array:
 
 
 def _mean(sets: Sequence[MapSet], parameter: str) -> Estimate:
-    """Over all maps and directions; the maps are what repeats, their directions are two numbers.
+    """Mean of a parameter over all maps and directions; each map is one repetition.
 
-    Both directions of a map share its day, so that only the mean of each map is a repetition. The
-    bench's constants shift all maps alike.
+    Both directions of a map share its day, so only the mean of each map is a repetition. The
+    bench's constants shift all maps equally.
     """
     parts = shared_parts(_found(sets, parameter))
     values, unit = _by_map(sets, parameter).mean(axis=1), UNITS[parameter]
-    told = of_repeats(parameter, values, unit, "maps", systematic=parts)
-    return _flagged(told, _found(sets, parameter))
+    mean = of_repeats(parameter, values, unit, "maps", systematic=parts)
+    return _flagged(mean, _found(sets, parameter))
 
 
 def _deviation(sets: Sequence[MapSet], parameter: str) -> Estimate:
-    """Relative standard deviation over all maps and directions, as Table 4.4 has it."""
-    told = relative_scatter(parameter, _by_map(sets, parameter))
-    return _flagged(told, _found(sets, parameter))
+    """Relative standard deviation over all maps and directions, as in Table 4.4."""
+    deviation = relative_scatter(parameter, _by_map(sets, parameter))
+    return _flagged(deviation, _found(sets, parameter))
 
 
 def _found(sets: Sequence[MapSet], parameter: str) -> list[Estimate]:
@@ -126,11 +126,11 @@ def _found(sets: Sequence[MapSet], parameter: str) -> list[Estimate]:
 
 
 def _flagged(told: Estimate, found: Sequence[Estimate]) -> Estimate:
-    """What maps say together, not determined where one of them says nothing of the parameter.
+    """Estimate over all maps, not determined if one map does not determine the parameter.
 
-    A value at its bound is not what the data say, and one that is not determined may be any: how
-    these scatter tells nothing. To leave them out would select: of what is nearly zero, only the
-    large values are determined. The number stays, for who wants to see it.
+    Values at a bound, and values that are not determined, do not follow from the data: their
+    scatter has no meaning. Omitting them would be a selection: of values near zero, only the large
+    ones are determined. The number remains for display.
     """
     doubtful = [each for each in found if each.origin in (Origin.AT_BOUND, Origin.NOT_DETERMINED)]
     if not doubtful or math.isnan(told.value):
@@ -160,8 +160,10 @@ def _findings(sets: Sequence[MapSet]) -> Iterator[Finding]:
             yield Finding.of(deviation, {"statistic": "relative standard deviation"})
     if known := [each for each in deviations if each.origin is not Origin.NOT_DETERMINED]:
         worst = max(known, key=lambda each: each.value)
-        told = Estimate.without_interval("relative_standard_deviation", worst.value, "", LARGEST())
-        yield Finding.of(told, {"parameters": "worst"})
+        largest = Estimate.without_interval(
+            "relative_standard_deviation", worst.value, "", LARGEST()
+        )
+        yield Finding.of(largest, {"parameters": "worst"})
 
 
 def _table(sets: Sequence[MapSet]) -> Table:
@@ -181,14 +183,14 @@ def _table(sets: Sequence[MapSet]) -> Table:
         row["mean"] = _mean(sets, parameter)
         row["deviation"] = _deviation(sets, parameter) if len(sets) > 1 else None
         rows.append(row)
-    told = "; ".join(f"sets {each.name}: {each.where}" for each in sets)
+    maps = "; ".join(f"sets {each.name}: {each.where}" for each in sets)
     return Table(
         key="repeatability",
         title="Static friction parameters of all sets",
         columns=tuple(columns),
         rows=tuple(rows),
         thesis=("4.4",),
-        note=f"{told}. The standard deviation is over all columns, divided by n; δ is fitted, too. "
+        note=f"{maps}. The standard deviation is over all columns, divided by n; δ is fitted, too. "
         "The interval of the mean is that of the maps. That of the deviation includes the "
         "difference between the directions, which is the same in all maps. Errors of the bench's "
         "constants shift all maps equally: the interval of the mean includes them. Neither has an "

@@ -47,7 +47,7 @@ from campaign.trial import OfferedRecording, Task, Tree, Trial, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
 LEAST_REST = 0.01
-"""s of standstill before a step."""
+"""Shortest standstill (s) before a step."""
 
 
 class StepResponseOptions(Options):
@@ -112,7 +112,7 @@ REST, ANSWER = "rest", "answer"
 
 
 def _windows(options: StepResponseOptions) -> Iterator[Window]:
-    """For the plan, and for archived trials that are older than windows."""
+    """Windows for the plan, and for archived trials without windows."""
     yield Window(REST, 0.0, options.rest)
     yield Window(ANSWER, options.rest, options.rest + options.duration)
 
@@ -120,7 +120,7 @@ def _windows(options: StepResponseOptions) -> Iterator[Window]:
 def _found(
     options: StepResponseOptions, bench: Bench, offered: OfferedRecording
 ) -> Iterator[TrialRequest]:
-    """The step of a recording that nobody planned."""
+    """Trial of the step in an unplanned recording."""
     request = step_found(offered, (REST, ANSWER))
     if float(str(request.options["rest"])) < LEAST_REST:
         raise ValueError(
@@ -131,14 +131,14 @@ def _found(
 
 
 def _answer(trial: Trial) -> Window:
-    """The window that all follows in: the one named so, or else from the step on."""
+    """Window of the response: the one named `answer`, else that of the options."""
     options = _options(trial)
     named = [window for window in trial.windows if window.name == ANSWER]
     return (named or [each for each in _windows(options) if each.name == ANSWER])[0]
 
 
 def _options(trial: Trial) -> StepResponseOptions:
-    """Of a trial. Raises ValueError, in words for a reader, where they are none of such a test."""
+    """Options of a trial. Raises ValueError with a message for the user if of another test."""
     try:
         return StepResponseOptions.model_validate(trial.options, context={"si": True})
     except ValidationError as error:
@@ -149,25 +149,25 @@ def _options(trial: Trial) -> StepResponseOptions:
 def _characteristics(
     trial: Trial, recording: Recording
 ) -> tuple[StepCharacteristics, Estimate | None]:
-    """What a step says, and its rise time with the interval that its noise leaves, if any."""
+    """Characteristics of a step, and its rise time with the interval of its noise, or None."""
     options, start = _options(trial), _answer(trial).start
     rate = recording[GYRO_RATE]
-    found = step_characteristics(recording.time, rate, start, options.step, options.band)
-    if not math.isfinite(found.rise_time):
-        return found, None
-    told = rise_interval(recording.time, rate, start, options.step, found)
-    if told is None:
-        return found, None
-    rise, rise_from = told
-    reasons = found.reasons | ({} if math.isfinite(rise.value) else {"rise_time": rise.reason})
-    found = replace(found, rise_time=rise.value, rise_from=rise_from, reasons=reasons)
-    return found, rise
+    step = step_characteristics(recording.time, rate, start, options.step, options.band)
+    if not math.isfinite(step.rise_time):
+        return step, None
+    interval = rise_interval(recording.time, rate, start, options.step, step)
+    if interval is None:
+        return step, None
+    rise, rise_from = interval
+    reasons = step.reasons | ({} if math.isfinite(rise.value) else {"rise_time": rise.reason})
+    step = replace(step, rise_time=rise.value, rise_from=rise_from, reasons=reasons)
+    return step, rise
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """Rise, settling, overshoot and what error stays; without those that were not seen."""
-    found, rise = _characteristics(data.trial, data.recording())
-    values = ((name, float(getattr(found, name)), unit) for name, unit in QUANTITIES)
+    """Rise time, settling time, steady-state error, overshoot; without those not seen."""
+    step, rise = _characteristics(data.trial, data.recording())
+    values = ((name, float(getattr(step, name)), unit) for name, unit in QUANTITIES)
     return tuple(
         rise
         if rise is not None and name == rise.name
@@ -188,13 +188,13 @@ def _without_friction(bench: Bench) -> Tree:
 
 def _evaluate(data: TrialData, paths: list[str]) -> Step:
     options = _options(data.trial)
-    recording: Recording = data.recording()  # for the figure, and for why there is no number
+    recording: Recording = data.recording()  # for the figure, and for reasons
     again, _ = _characteristics(data.trial, recording)
-    found = dict(metrics(data, _measure))
+    estimates = dict(metrics(data, _measure))
     for name, unit in QUANTITIES:
-        if name not in found:
+        if name not in estimates:
             reason = again.reasons.get(name, NOT_SEEN())
-            found[name] = Estimate.without_interval(name, math.nan, unit, reason)
+            estimates[name] = Estimate.without_interval(name, math.nan, unit, reason)
     rate, start = recording[GYRO_RATE], _answer(data.trial).start
     before = rate[(recording.time < start) & np.isfinite(rate)]
     place = conditions(data, "compensation", "linear")
@@ -214,7 +214,7 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
         float(np.mean(before)) if before.size else 0.0,
         options,
         again.rise_from - start,
-        found,
+        estimates,
     )
 
 
@@ -246,7 +246,7 @@ def _analyse(data: TestData) -> Result:
 
 
 def _notes(step: Step) -> Iterator[str]:
-    """What of a step has no number, and why."""
+    """Sentences on the characteristics of a step without a number, with the reason."""
     label = f"{step.label[0].upper()}{step.label[1:]}"
     for name, what in UNSEEN.items():
         reason = step.found[name].reason
@@ -260,20 +260,20 @@ def _notes(step: Step) -> Iterator[str]:
 
 
 UNSEEN = {"rise_time": "rise time", "settling_time": "settling time", "overshoot": "overshoot"}
-"""What a step may not show, in words."""
+"""Texts of the characteristics that a step may not show."""
 
 
 def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
     """Mean of a characteristic over repeated steps, with the interval of their scatter.
 
-    Of one step it is its own, with what its noise leaves open.
+    A single step has its own value, with the interval of its noise.
     """
     if len(repeats) == 1 and repeats[0].found[name].has_interval:
         return repeats[0].found[name]
     values = [step.value(name) for step in repeats]
     if not all(map(math.isfinite, values)):
         unseen = [step.found[name].reason for step in repeats if math.isnan(step.value(name))]
-        # Told where all read alike: their values may differ by less than a text shows.
+        # Compare the texts: their values may differ by less than a text shows.
         why = unseen[0] if len(set(map(str, unseen))) == 1 else NOT_SEEN()
         return Estimate.without_interval(name, math.nan, unit, why)
     return drop_interval_if_deterministic(of_repeats(name, values, unit), max(map(abs, values)))
@@ -285,7 +285,7 @@ SHOWN = 2.5
 
 @dataclass(frozen=True)
 class Step:
-    """One step and what it says: time from the step, rate and command, shape (n,), SI.
+    """One step with its characteristics: time from the step, rate, command, shape (n,), SI.
 
     The command is None where it was not recorded; `level` is the rate (rad/s) before the step.
     """
@@ -332,7 +332,7 @@ def step_table(steps: Sequence[Step], extra: Sequence[str]) -> Table:
 
 
 def step_figure(steps: Sequence[Step]) -> Figure:
-    """The steps over time, with what the first of them shows marked."""
+    """Figure of the steps over time, with marks on the first of them."""
     first = steps[0]
     times = [step.value("settling_time") for step in steps]
     settled = [time for time in times if math.isfinite(time)]
@@ -369,13 +369,13 @@ def step_figure(steps: Sequence[Step]) -> Figure:
 
 
 def _marks(step: Step) -> Iterator[Mark]:
-    """Rise, overshoot and settling of one step, where they were seen."""
+    """Marks of rise, overshoot and settling of one step, as far as seen."""
     rise, settled, over = (step.value(name) for name in ("rise_time", "settling_time", "overshoot"))
     if math.isfinite(rise + step.rise_from):
         start = step.rise_from
         yield Mark(f"rise {_time(rise)}", x=start, until=start + rise, series=step.series)
     if over > 0:
-        # Only after the step: noise before it may lie as far out.
+        # Only after the step: noise before it may be as large.
         share = np.where(step.time >= 0, step.rate / step.options.step, np.nan)
         peak = int(np.nanargmax(share))
         label = f"overshoot {100 * over:.3g} %"

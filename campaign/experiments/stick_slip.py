@@ -89,47 +89,47 @@ def _trials(options: StickSlipOptions, bench: Bench) -> Iterator[TrialRequest]:
 
 
 UNITS = {"first_slip": "s", "period": "s", "peak_torque": "N m", "top_rate": "rad/s"}
-"""What a pull shows: time of the first slip, mean time between slips (without the first, whose
+"""Metrics of a pull: time of the first slip, mean time between slips (without the first, whose
 spring began unstretched), largest torque of the spring, and largest rate of the load."""
 OF_SLIPS = ("first_slip", "period")
 TOO_FEW_SLIPS = Cause("too few slips", "there were too few slips")
 PREFIX = "stick_slip_"
 PARTS = 200
-"""Of a period, in which a rest is looked for."""
+"""Parts of a period, in the search for a rest."""
 RESTS, AT_REST = 0.2, 0.005
-"""Share of a period in which a load at rest moves by less than a share of what the pull moves in a
-period: 0.2 of one that swings about the pull without damping, and just comes to a halt, are 0.013.
-"""
+"""A load rests if, in the first share of a period, it moves by at most the second share of the pull
+in a period. For comparison: a load that swings undamped about the pull, and just stops, moves by a
+share of 0.013 in 0.2 of a period."""
 
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
-    """The number of slips, and what `UNITS` names as far as the pull came to it."""
+    """Numbers of slips and rests, and the metrics of `UNITS` that the pull shows."""
     options = StickSlipOptions.model_validate(data.trial.options, context={"si": True})
     recording = data.recording()
     rate = recording[LOAD_RATE]
     peaks = peak("peak_torque", recording[DRIVE_TORQUE], "N m"), peak("top_rate", rate, "rad/s")
-    if not np.all(np.isfinite(rate)):  # nobody knows how many slips were lost
+    if not np.all(np.isfinite(rate)):  # the number of lost slips is unknown
         return simulated(replace(each, name=PREFIX + each.name) for each in peaks)
     times, before = upward_crossings(recording.time, rate, options.slip_rate)
     step = 1.0 / data.trial.task.sample_rate
     counts = {"slips": float(len(times))}
     if RELATIVE_ANGLE in recording.channels and np.all(np.isfinite(recording[RELATIVE_ANGLE])):
         counts["rests"] = _rests(recording, times, options.pull_rate)
-    found = [
+    estimates = [
         *(Estimate(name, n, "", kind="count", reason=COUNTED()) for name, n in counts.items()),
         *peaks,
     ]
     if len(times):
         ends = float(before[0]), float(before[0]) + step
         method = "where the rate rises, between two samples"
-        found.append(bracketed("first_slip", float(times[0]), "s", ends, method))
+        estimates.append(bracketed("first_slip", float(times[0]), "s", ends, method))
     if len(times) > 2:
-        found.append(_period(np.diff(times[1:]), step))
-    return simulated(replace(each, name=PREFIX + each.name) for each in found)
+        estimates.append(_period(np.diff(times[1:]), step))
+    return simulated(replace(each, name=PREFIX + each.name) for each in estimates)
 
 
 def _rests(recording: Recording, slips: Array, pull: float) -> float:
-    """How often in a row, up to the last slip, the load rests between slips; `slips` (s), (n,)."""
+    """Number of consecutive periods with a rest, up to the last slip; `slips` (s), shape (n,)."""
     count = 0
     for start, end in reversed(list(pairwise(slips))):
         time = np.linspace(start, end, 1 + PARTS)
@@ -142,21 +142,21 @@ def _rests(recording: Recording, slips: Array, pull: float) -> float:
 
 
 def _period(between: Array, step: float) -> Estimate:
-    """Mean time between slips (s) from each of them, shape (n,), timed to one `step` (s)."""
+    """Mean of the times `between` slips (s), shape (n,), each timed to one `step` (s)."""
     mean, one = float(np.mean(between)), step / len(between)
     if len(between) == 1:
         method = "one time between slips, each between two samples"
         return bracketed("period", mean, "s", (mean - one, mean + one), method)
-    # The first and the last slip err by at most a step each; a triangular distribution of both.
-    found = of_repeats("period", between, "s", "times between slips")
-    return shifted_by(found, SAMPLES, one / math.sqrt(6.0))
+    # First and last slip have errors of at most a step: together a triangular distribution.
+    period = of_repeats("period", between, "s", "times between slips")
+    return shifted_by(period, SAMPLES, one / math.sqrt(6.0))
 
 
 def _analyse(data: TestData) -> Result:
-    found = places(data.completed(), own=())
-    if not found:
+    groups = places(data.completed(), own=())
+    if not groups:
         return Result()
-    measured = [(place, _shown(place)) for place in found]
+    measured = [(place, _shown(place)) for place in groups]
     rows: list[dict[str, Cell]] = [
         {
             **place.point,
@@ -170,7 +170,7 @@ def _analyse(data: TestData) -> Result:
         key="stick-slip",
         title="Stick-slip of a load pulled through a spring",
         columns=(
-            *found[0].columns,
+            *groups[0].columns,
             Column("slips", "Slips", exact=True),
             Column("rests", "Rests", exact=True),
             Column("first_slip", "First slip", "s", "s"),
@@ -193,34 +193,34 @@ def _analyse(data: TestData) -> Result:
         for place, m in measured
         if math.isnan(m["period"].value) and not math.isnan(m["slips"].value)
     ]
-    whose = few if len(few) <= HISTORIES else [f"{len(few)} of {len(measured)} pulls"]
+    loads = few if len(few) <= HISTORIES else [f"{len(few)} of {len(measured)} pulls"]
     notes = (
-        f"{who}: fewer than three slips, so there is no period; pull longer, slower, or through a "
+        f"{load}: fewer than three slips, so there is no period; pull longer, slower, or through a "
         "softer spring."
-        for who in whose
+        for load in loads
     )
     drawn = map_of(measured, StickSlipOptions) or _figure(measured)
     return Result((table,), tuple(filter(None, (drawn,))), findings, tuple(notes))
 
 
 def _count(slips: float) -> int | float | None:
-    """A mean of repeats may be no whole number; None where a recording does not show it."""
+    """Count as a whole number, or as a mean of repeats; None if it is not determined."""
     if math.isnan(slips):
         return None
     return int(slips) if slips.is_integer() else slips
 
 
 def _shown(place: ConditionGroup) -> dict[str, Estimate]:
-    """What the pulls of a place show, by name; what they did not come to is not determined."""
-    found = {
+    """Metrics of the pulls of a condition, by name; missing ones are not determined."""
+    estimates = {
         name.removeprefix(PREFIX): each for name, each in combined(place.trials, _measure).items()
     }
-    counted = "slips" in found
+    counted = "slips" in estimates
     for name, unit in {"slips": "", "rests": "", **UNITS}.items():
-        if name not in found:
+        if name not in estimates:
             cause = TOO_FEW_SLIPS if counted and name in OF_SLIPS else LOST
-            found[name] = Estimate.without_interval(name, math.nan, unit, cause())
-    return found
+            estimates[name] = Estimate.without_interval(name, math.nan, unit, cause())
+    return estimates
 
 
 def _figure(measured: Measured) -> Figure | None:
@@ -260,7 +260,7 @@ def _figure(measured: Measured) -> Figure | None:
 
 
 def _first_slip(recording: Recording, found: Mapping[str, Estimate], series: str) -> Iterator[Mark]:
-    """The moment at which the load first slips, on the torque of the spring."""
+    """Mark of the first slip on the torque of the spring."""
     at, torque = found["first_slip"].value, recording[DRIVE_TORQUE]
     known = np.isfinite(torque)
     if math.isfinite(at) and known.any():
@@ -270,14 +270,14 @@ def _first_slip(recording: Recording, found: Mapping[str, Estimate], series: str
 
 
 def _how(item: TrialData) -> str:
-    """Under which condition the load was pulled."""
+    """Caption sentence: rate of the pull and stiffness of the spring."""
     options = StickSlipOptions.model_validate(item.trial.options, context={"si": True})
     pull, spring = setting(options.pull_rate, "rad/s"), setting(options.stiffness, "N m/rad")
     return f"The load is pulled at {pull} through a spring of {spring}."
 
 
 def _what_shows(place: ConditionGroup, found: Mapping[str, Estimate]) -> str:
-    """How often the load slipped, if it did, and how fast it then was."""
+    """Caption sentence: number of slips, mean period, largest rate."""
     who, slips = place.label or "the load", found["slips"].value
     if math.isnan(slips):
         return sentence(f"{who}: samples were lost, and the number of slips is not known")
@@ -291,12 +291,12 @@ def _what_shows(place: ConditionGroup, found: Mapping[str, Estimate]) -> str:
 
 
 Measured = Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]
-"""What the pulls of each place show, by name."""
+"""Conditions, each with the metrics of its pulls by name."""
 SHORT = 0.1
-"""Of a pull, within which the load must first slip: a load that sticks again does so within twice
-that time, and a swing."""
+"""Share of a pull within which the load must first slip: a load that sticks again does so within
+twice that time and one swing."""
 HISTORIES = 8
-"""So many pulls are drawn over time; of more with two swept numbers a map is drawn."""
+"""Most pulls that are drawn over time; more pulls with two swept numbers give a map."""
 
 
 def _kind(found: Mapping[str, Estimate], place: ConditionGroup) -> str:
@@ -309,19 +309,19 @@ def _kind(found: Mapping[str, Estimate], place: ConditionGroup) -> str:
 
 
 def _counts(measured: Measured) -> str:
-    """In how many pulls each model sticks and slips."""
+    """Caption sentence: number of pulls with stick-slip, by model."""
     kinds: dict[str, list[str]] = {}
     for place, found in measured:
         model = str(place.point.get("model", ""))
         kinds.setdefault(model and f" ({model_label(model)})", []).append(_kind(found, place))
-    told = (f"{own.count('stick-slip')} of {len(own)} pulls{who}" for who, own in kinds.items())
-    return f"Stick-slip in {', '.join(told)}."
+    parts = (f"{own.count('stick-slip')} of {len(own)} pulls{who}" for who, own in kinds.items())
+    return f"Stick-slip in {', '.join(parts)}."
 
 
 def map_of(measured: Measured, options: type[Options]) -> Figure | None:
-    """Stick-slip over the two swept numbers with most values; None where there are few pulls.
+    """Map of stick-slip over the two swept numbers with most values; None for few pulls.
 
-    Rests in several periods tell stick-slip from a swing that dies out.
+    Rests in several periods distinguish stick-slip from a decaying oscillation.
     """
     swept: dict[str, set[float]] = {}
     for place, _ in measured:
@@ -343,8 +343,8 @@ def map_of(measured: Measured, options: type[Options]) -> Figure | None:
     panels: dict[str, list[tuple[str, float, float]]] = {}
     for place, found in measured:
         others = {path: value for path, value in place.point.items() if path not in across}
-        told = words(others, trial, options, frozenset(others))
-        title = ", ".join(reversed(list(told)))
+        texts = words(others, trial, options, frozenset(others))
+        title = ", ".join(reversed(list(texts)))
         x, y = (float(str(place.point[path])) for path in across)
         panels.setdefault(title, []).append((_kind(found, place), x, y))
     looks = {

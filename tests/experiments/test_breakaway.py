@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from campaign.estimation.intervals import with_error
 from campaign.experiments import experiments
 from campaign.experiments.breakaway.experiment import _damping, default_positions
 from campaign.experiments.breakaway.figures import DOTS, _what_shows
-from campaign.experiments.breakaway.means import _between, mean
+from campaign.experiments.breakaway.means import Ramps, _between, _shift, mean
 from campaign.physics.bench import Bench
 from campaign.result import Result
 from tests.estimation.coverage import holds, rejected
@@ -260,6 +261,20 @@ def test_the_sweep_of_ramp_rate_and_dwell_shows_what_they_shift() -> None:
     assert parts["dwell"] is None
     parts = {part.source: part.standard_uncertainty for part in fast.estimate.systematic}
     assert parts["ramp rate"] == pytest.approx(shift * 4.0 / 3.0 / np.sqrt(3.0))
+
+
+@pytest.mark.parametrize("error", [0.0, None])
+def test_a_shift_by_ramp_rate_reaches_to_rate_zero_without_scatter(error: float | None) -> None:
+    def one(rate: float, torque: float) -> Ramps:
+        found = Estimate("breakaway_torque", torque, "N m", reason=MADE_UP())
+        if error is not None:
+            found = with_error("breakaway_torque", torque, "N m", error, 200.0, "")
+        trial = SimpleNamespace(trial=SimpleNamespace(options={"torque_rate": rate}))
+        return Ramps((trial,), ({"direction": "positive"},), ({"breakaway_torque": found},))
+
+    slow, fast = one(1.0, 31.0), one(4.0, 30.4)
+    shift = _shift(slow, [slow, fast], "breakaway_torque", "ramp rate")
+    assert shift == pytest.approx(0.6 / 3.0 / np.sqrt(3.0))
 
 
 def ramp(value: float, error: float, **more: Any) -> Estimate:

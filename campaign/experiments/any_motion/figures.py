@@ -21,15 +21,15 @@ PLACE = Axis("Angle", "rad", "deg")
 FORCE = Axis("Torque", "N m", "N m")
 LEFT = Axis("Left over", "N m", "N m")
 LAGS = 200
-"""Lags of the autocorrelation that are drawn, at most."""
+"""Largest number of drawn lags of the autocorrelation."""
 BEST = 4
-"""Models whose residuals are drawn beside each other."""
+"""Largest number of models whose residuals are drawn."""
 BINS = 40
-"""of the rate, for means of what is left over."""
+"""of the rate, for means of friction torque in both directions together."""
 
 
 def figures(found: InverseDynamics) -> Iterator[Figure]:
-    """All of them, the most telling first."""
+    """All figures, the most important first."""
     yield friction_figure(found)
     if found.best.predictions:
         yield validation_figure(found)
@@ -38,7 +38,7 @@ def figures(found: InverseDynamics) -> Iterator[Figure]:
 
 
 def friction_figure(found: InverseDynamics) -> Figure:
-    """Force less what accelerates, over the rate; the model's line. Both of rows that move."""
+    """Force less the inertia term over the rate, measured and modeled, for moving rows."""
     best = found.best
     moves = _moving(found)
     rate = place_and_rate(found.pieces, found.filtering)[moves, 1]
@@ -75,7 +75,7 @@ def friction_figure(found: InverseDynamics) -> Figure:
 
 
 def residual_figure(found: InverseDynamics) -> Figure:
-    """What the chosen model leaves over: over time, rate and angle, and its autocorrelation."""
+    """Residuals of the chosen model over time, rate and angle, and their autocorrelation."""
     fit = found.fit
     own = place_and_rate(found.pieces, found.filtering)
     time = np.concatenate([kept_times(piece.motion, found.filtering) for piece in found.pieces])
@@ -112,15 +112,15 @@ def residual_figure(found: InverseDynamics) -> Figure:
 
 
 def validation_figure(found: InverseDynamics) -> Figure:
-    """Force of motions that nothing was fitted to, and what the chosen model said of it."""
+    """Force of the validation motions, measured and predicted by the chosen model."""
     whole = together(found.best.predictions)
     share = found.best.validation
-    told = f"{100 * share.value:.2f} %" if share is not None else ""
+    residual = f"{100 * share.value:.2f} %" if share is not None else ""
     return Figure(
         key="prediction",
         title="Prediction of the validation motion",
         caption="Torque of the validation motion and the chosen model's prediction, with what is "
-        f"left over: {told} of the torque.",
+        f"left over: {residual} of the torque.",
         alt="Measured and predicted torque over time, and their difference.",
         panels=(
             Panel(TIME, FORCE, (
@@ -135,10 +135,10 @@ def validation_figure(found: InverseDynamics) -> Figure:
 
 
 def models_figure(found: InverseDynamics) -> Figure:
-    """What the plain model and the best others leave over of the validation."""
-    told = shown_models(found)
+    """Validation residuals of the plain models and the chosen one."""
+    models = shown_models(found)
     panels = []
-    for title, each in told:
+    for title, each in models:
         own = together(each.predictions)
         share = 100.0 * own.relative
         curve = Curve(*with_gaps(own.time, own.residuals), "", "measured", "thin")
@@ -155,7 +155,7 @@ def models_figure(found: InverseDynamics) -> Figure:
 
 
 def shown_models(found: InverseDynamics) -> list[tuple[str, CandidateFit]]:
-    """Plain models, the start with its delay, and the chosen one; no two alike."""
+    """Titles and fits: plain models, the first with a delay, and the chosen one; each once."""
     picked = [0, 1] if len(found.tried) > 2 and found.tried[1].delay == 0.0 else [0]
     later = [i for i, each in enumerate(found.tried) if each.delay != 0.0]
     picked += [*later[:1], found.chosen]
@@ -174,32 +174,32 @@ def _is_symmetric(each: CandidateFit) -> bool:
 
 
 def autocorrelation(residuals: Sequence[Array]) -> tuple[Array, Array, float]:
-    """Lags (rows), the autocorrelation there, and the half-width of its band for white rows."""
+    """Lags (rows), autocorrelation, and the half-width of its 95 % band for white residuals."""
     count = sum(len(each) for each in residuals)
     most = min(LAGS, max(len(each) for each in residuals) // 4)
     square = sum(float(each @ each) for each in residuals)
     lags = np.arange(most + 1)
-    found = [
+    correlation = [
         sum(float(e[lag:] @ e[: len(e) - lag]) for e in residuals if len(e) > lag) / square
         for lag in lags
     ]
-    return lags.astype(float), np.array(found), 1.96 / float(np.sqrt(count))
+    return lags.astype(float), np.array(correlation), 1.96 / float(np.sqrt(count))
 
 
 def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
-    """With a gap wherever time begins anew: no line leads from one recording to the next."""
+    """Curves with a gap (NaN) wherever time restarts, so that no line connects two recordings."""
     anew = np.flatnonzero(np.diff(time) < 0.0) + 1
     return np.insert(time, anew, np.nan), np.insert(values, anew, np.nan)
 
 
 def _moving(found: InverseDynamics) -> NDArray[np.bool_]:
-    """Which rows move, and were fitted; standstill is held by whatever friction it takes."""
+    """Mask of the rows that move and are fitted; friction at standstill balances any force."""
     parts = [moving(each.motion, found.filtering) for each in found.pieces]
     return np.concatenate(parts) > 0.0
 
 
 def _binned(rate: Array, rest: Array, model: Array) -> tuple[Array, Array, Array]:
-    """Means over bins of rate, each of one direction; a gap between the directions."""
+    """Means over bins of rate, for each direction; a gap (NaN) between the directions."""
     means: list[tuple[float, float, float]] = []
     for own in (rate < 0.0, rate > 0.0):
         if not own.any():
@@ -208,7 +208,7 @@ def _binned(rate: Array, rest: Array, model: Array) -> tuple[Array, Array, Array
         which = np.where(own, np.searchsorted(edges[1:-1], rate, side="right"), -1)
         means += [(math.nan,) * 3] if means else []
         for each in np.unique(which[own]):
-            here = which == each
-            means.append((rate[here].mean(), rest[here].mean(), model[here].mean()))
+            inside = which == each
+            means.append((rate[inside].mean(), rest[inside].mean(), model[inside].mean()))
     centre, measured, modelled = np.array(means).T
     return centre, measured, modelled

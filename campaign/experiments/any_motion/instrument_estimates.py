@@ -1,10 +1,10 @@
 """Coefficients by instruments: a simulated motion replaces the measured regressors.
 
-Where it is known what motion was wanted, the loop that made the force of it is found, and the
-fitted model is simulated within that loop: nothing in its motion knows of noise or of what else
-disturbed the axis. Where it is not, the model goes along the recorded force, which a loop may have
-made of noise: that is told beside least squares, and decides nothing. Simulated again with what
-instruments say, as refined instrumental variables are.
+If the commanded motion is recorded, the loop between command and force is estimated, and the fitted
+model is simulated within that loop: its motion has no noise and no disturbance. If not, the model
+follows the recorded force, in which a loop may have put noise. Such instruments are reported beside
+least squares and decide nothing. A second simulation uses the coefficients of the first, as refined
+instrumental variables do.
 """
 
 from __future__ import annotations
@@ -35,25 +35,25 @@ from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.motions import MotionPiece
 
 ROUNDS = 2
-"""Times that the model is simulated, each time with what instruments said before."""
+"""Number of simulations; each uses the coefficients that instruments gave before."""
 ALONG_WANTED = "simulated along the wanted motion"
 ALONG_FORCE = "simulated along the recorded force"
 NORMAL_95 = 1.96
 """Half of a two-sided 95 % interval over its standard deviation."""
 UNSTABLE = 100.0
-"""Times the fastest measured rate: a simulated motion that is faster is none of this axis."""
+"""Times the fastest measured rate, above which a simulated motion is unstable."""
 
 
 @dataclass(frozen=True)
 class Instruments:
-    """What instruments say.
+    """Estimates by instruments.
 
     Attributes:
-        along: what the motion was simulated along.
-        of_wanted: whether that is the wanted motion, so that no noise is in it.
+        along: the signal along which the motion was simulated.
+        of_wanted: whether that signal is the commanded motion, which has no noise.
         found: the regression; with `delay` its last coefficient is that of the delay.
-        estimates: of the terms, by name, with what half the band says otherwise.
-        delay: of the force; None where it was taken as known.
+        estimates: of the terms, by name, with systematic parts of band, rate limit and delay.
+        delay: of the force; None if it was not fitted, or is at the end of its range.
     """
 
     along: str
@@ -63,7 +63,7 @@ class Instruments:
     delay: Estimate | None
 
     def strength(self, index: int) -> float:
-        """F of the first stage of a term."""
+        """F of the first stage of a term, by its index."""
         return float(self.found.strength[index])
 
 
@@ -76,11 +76,11 @@ def instruments(
     *,
     stated: bool = False,
 ) -> tuple[Instruments | None, str]:
-    """By the wanted motion where it was recorded, or else along the force; or why there are none.
+    """Instruments by the commanded motion, or else along the force; and why not the better ones.
 
     Args:
         values: of the terms, by least squares.
-        delay: of the force (s); found anew with the wanted motion, unless it is `stated`.
+        delay: of the force (s); fitted again with the commanded motion, unless it is `stated`.
     """
     wanted = [each.wanted for each in pieces]
     try:
@@ -92,36 +92,34 @@ def instruments(
             if each.wanted is not None
         ]
         for fitted in (False,) if stated else (True, False):
-            found = _iterated(
+            fit = _iterated(
                 pieces, terms, values, filtering, delay, loops, fitted=fitted, stated=stated
             )
-            if not fitted or _strong(found, len(terms) + 1):
+            if not fitted or _strong(fit, len(terms) + 1):
                 break
-        if weak := _weak(found, terms):
+        if weak := _weak(fit, terms):
             raise ValueError(weak)
     except ValueError as error:
         why = str(error)
     else:
-        return found, ""
+        return fit, ""
     try:
-        found = _iterated(
-            pieces, terms, values, filtering, delay, None, fitted=False, stated=stated
-        )
+        fit = _iterated(pieces, terms, values, filtering, delay, None, fitted=False, stated=stated)
     except ValueError as error:
         return None, f"{why}; along the recorded force: {error}"
-    if weak := _weak(found, terms):
+    if weak := _weak(fit, terms):
         return None, f"{why}; along the recorded force: {weak}"
-    return found, why
+    return fit, why
 
 
 def held_against(
     squares: Mapping[str, Estimate], found: Instruments | None
 ) -> tuple[dict[str, Estimate], bool]:
-    """Coefficients that are told, by name, and whether they are those of instruments.
+    """Reported coefficients by name, and whether they are those of instruments.
 
-    Least squares, with what instruments say otherwise as a systematic part. Where the two differ by
-    more than scatter explains, noise of the motion biases least squares: then instruments are told,
-    all of them, where these know of no noise.
+    Least squares, with their difference to instruments as a systematic part. A difference larger
+    than scatter shows that noise of the motion biases least squares. Then all coefficients are
+    those of instruments, if these are of the commanded motion.
     """
     if found is None:
         return dict(squares), False
@@ -131,15 +129,15 @@ def held_against(
 
 
 def differs(squares: Mapping[str, Estimate], found: Instruments) -> bool:
-    """Whether some coefficient of the two differs by more than scatter explains."""
+    """Whether a coefficient of the two differs by more than its scatter."""
     return any(_differ(one, found.estimates[name]) for name, one in squares.items())
 
 
 def judged_delay(late: Estimate, found: Instruments | None) -> Estimate:
-    """The delay that is told: held against instruments, as coefficients are.
+    """The reported delay: checked against instruments, as coefficients are.
 
-    Without any that know of no noise, nobody knows how much of it a loop makes of noise and of what
-    disturbs the axis: it may be none at all.
+    Without a delay by instruments, the whole delay may be a loop's reaction to noise and
+    disturbances: its systematic part then includes zero.
     """
     if late.origin is Origin.GIVEN:
         return late
@@ -153,9 +151,9 @@ def judged_delay(late: Estimate, found: Instruments | None) -> Estimate:
 
 
 def _differ(one: Estimate, other: Estimate) -> bool:
-    """By more than the scatter of the one and the interval of the other; never without either.
+    """Whether two differ by more than the scatter of `one` and the interval of `other`.
 
-    What is systematic in least squares is, in part, the very noise that instruments are free of.
+    False without these. Systematic parts of `one` are left out: they include the tested noise.
     """
     if one.low is None or one.high is None:
         return False
@@ -192,43 +190,43 @@ def _iterated(
     fitted: bool,
     stated: bool,
 ) -> Instruments:
-    """fitted: whether the delay is found as well; stated: whether it is known.
+    """Instruments after `ROUNDS` simulations. Raises ValueError if there is no regression.
 
-    Raises ValueError where nothing comes of it.
+    fitted: whether the delay is fitted too; stated: whether it is known.
     """
     reach = max(LONGEST, 5.0 / pieces[0].motion.sample_rate)
     for _ in range(ROUNDS):
         made = _simulated(pieces, terms, values, delay, loops)
-        found = _regressed(pieces, made, terms, values, filtering, delay, fitted=fitted)
+        fit = _regressed(pieces, made, terms, values, filtering, delay, fitted=fitted)
         at, before = values, delay
-        values = found.fit.values[: len(terms)]
+        values = fit.fit.values[: len(terms)]
         if fitted:
-            delay = min(max(delay + float(found.fit.values[-1]), -reach), reach)
+            delay = min(max(delay + float(fit.fit.values[-1]), -reach), reach)
     along = ALONG_FORCE if loops is None else ALONG_WANTED
     others = {
         "band": [(filtering.half_band, before)],
         "slow": [(each, before) for each in filtering.faster],
     }
     if not fitted and not stated:
-        doubt = max(1.0 / pieces[0].motion.sample_rate, abs(before) / NORMAL_95)
-        others["delay"] = [(filtering, before - doubt)]
+        uncertainty = max(1.0 / pieces[0].motion.sample_rate, abs(before) / NORMAL_95)
+        others["delay"] = [(filtering, before - uncertainty)]
 
     def other(rows: FilterSettings, late: float) -> Array:
         return _regressed(pieces, made, terms, at, rows, late, fitted=fitted).fit.values
 
     parts = {
-        source: farthest(found.fit.values, [partial(other, *each) for each in every])
+        source: farthest(fit.fit.values, [partial(other, *each) for each in every])
         for source, every in others.items()
     }
-    told = [
-        _estimate(term.name, term.unit, along, found, index, float(values[index]), parts)
+    estimates = [
+        _estimate(term.name, term.unit, along, fit, index, float(values[index]), parts)
         for index, term in enumerate(terms)
     ]
-    told_late = None
+    delay_estimate = None
     if fitted and abs(delay) < reach:
-        told_late = _estimate("delay", "s", along, found, len(terms), delay, parts)
-    by_name = {each.name: each for each in told}
-    return Instruments(along, loops is not None, found, by_name, told_late)
+        delay_estimate = _estimate("delay", "s", along, fit, len(terms), delay, parts)
+    by_name = {each.name: each for each in estimates}
+    return Instruments(along, loops is not None, fit, by_name, delay_estimate)
 
 
 def _simulated(
@@ -261,7 +259,7 @@ def _regressed(
     *,
     fitted: bool,
 ) -> InstrumentFit:
-    """Rows where both move; a column more for the delay: how the model's force changes in time."""
+    """Regression on rows where both move; for the delay a column: the model force's time slope."""
     own: list[Piece] = []
     other: list[Piece] = []
     for piece, one in zip(pieces, made, strict=True):
@@ -271,7 +269,7 @@ def _regressed(
         for each, into in zip(rows, (own, other), strict=True):
             columns = each.columns
             if fitted:
-                # Its coefficient is by how much later still the force acts.
+                # Its coefficient is the further delay of the force.
                 change = np.gradient(columns @ values, each.time)
                 columns = np.column_stack([columns, change])
             into.append(Piece(columns * both[:, None], each.force * both, each.time))

@@ -37,9 +37,9 @@ from campaign.experiments.any_motion.motions import MotionPiece, never_moved
 from campaign.reason import Cause
 
 SQUARED = "_squared"
-"""Behind the name of a term over temperature: the term by which that may bend."""
+"""Suffix of the quadratic counterpart of a term over temperature."""
 ROUNDS = 4
-"""Most times that terms are chosen at a delay, and the delay is found anew with them."""
+"""Largest number of rounds: terms are chosen at a delay, then the delay is estimated again."""
 BENDS = Cause(
     "friction bends",
     "friction is nonlinear over these rates: it is one share of a sum, without own meaning",
@@ -49,15 +49,15 @@ STATED = Cause("stated", "stated")
 
 @dataclass(frozen=True)
 class CandidateFit:
-    """A structure, at a delay, and how it predicts what it was not fitted to.
+    """A structure at a delay, with its predictions of the validation.
 
     Attributes:
         delay: s.
-        predictions: of each piece of the validation; empty without any.
-        validation: relative residual there; None without any.
-        gain: by how much that is lower than of the plain directional model; None likewise.
-        simulated: relative error of the rate that is simulated from the force; NaN where nobody
-            did that, or nobody can.
+        predictions: of each piece of the validation; empty without validation.
+        validation: relative residual of the validation; None without validation.
+        gain: reduction of that residual against the plain directional model; None if there is none.
+        simulated: relative error of the rate simulated from the force; NaN if it was not simulated
+            or cannot be.
     """
 
     structure: Structure
@@ -70,20 +70,20 @@ class CandidateFit:
 
 @dataclass(frozen=True)
 class InverseDynamics:
-    """All that was found.
+    """Result of inverse dynamics.
 
     Attributes:
-        delay: of the force, with what a loop may have to do with it; or as it was stated.
-        plain: symmetric and directional model without any delay, as anybody would fit them.
-        tried: all structures, those of `plain` first.
+        delay: of the force, checked against instruments; or as stated.
+        tried: fits of all structures; first the plain ones without delay (symmetric and
+            directional, or one direction).
         chosen: index in `tried`.
-        squares: of the chosen structure's terms, by name, with their systematic parts.
-        estimates: the same as they are told, held against instruments.
+        squares: least-squares estimates of the chosen terms, by name, with systematic parts.
+        estimates: reported estimates of the same terms, checked against instruments.
         instruments: of the chosen structure, or None.
-        no_instruments: why there are none, or none along a wanted motion.
-        biased: whether least squares differ from instruments by more than scatter explains, so
-            that these are told.
-        period: over position, that was tried; None without any.
+        no_instruments: why there are none, or none along the commanded motion.
+        biased: whether least squares differ from instruments by more than their scatter; then
+            `estimates` are those of instruments.
+        period: period over position that was tried; None without one.
     """
 
     pieces: tuple[MotionPiece, ...]
@@ -100,17 +100,17 @@ class InverseDynamics:
 
     @property
     def best(self) -> CandidateFit:
-        """The chosen one."""
+        """The chosen fit."""
         return self.tried[self.chosen]
 
     @property
     def fit(self) -> Regression:
-        """Of the chosen structure."""
+        """Regression of the chosen structure."""
         return self.best.structure.fit
 
     @property
     def matters(self) -> dict[str, float]:
-        """Size of each coefficient, by name, below which its force does not matter here."""
+        """Size of each coefficient, by name, below which its force is negligible in this motion."""
         return dict(zip(self.best.structure.names, map(float, self.fit.matters), strict=True))
 
 
@@ -124,15 +124,15 @@ def find(
     linear: bool = False,
     say: Callable[[str], None] = lambda text: None,
 ) -> InverseDynamics:
-    """Identify from `pieces`; `unseen` is predicted when everything is chosen.
+    """Identify from `pieces`; then predict `unseen`.
 
     Args:
-        delay: of the force (s); None: it is found, and taken out where it is surely there.
+        delay: of the force (s); None: estimated, and removed if its interval excludes zero.
         terms: the structure; None: it is chosen.
-        linear: whether the axis travels: no gravity over an angle then.
-        say: is told which step of four this is; the first has read the motion.
+        linear: whether the axis is linear: then there is no gravity over an angle.
+        say: receives the text of steps 2 to 4; step 1 has read the motion.
 
-    Raises ValueError where the motions cannot tell even the symmetric model.
+    Raises ValueError if the motions do not determine even the plain model.
     """
     motions = [each.motion for each in pieces]
     say("step 2 of 4, delay and terms")
@@ -146,24 +146,24 @@ def find(
         period = _period(motions, more[picked].terms, filtering, shift)
         candidates = _candidates(motions, period, linear=linear)
         more, picked = choose(motions, start, candidates, filtering, shift)
-        # What the terms lacked may have looked like a delay, and the other way round.
+        # A missing term may have resembled a delay, and a delay a missing term.
         late = _delay(motions, more[picked].terms, filtering, delay)
         before, shift = shift, _taken_out(late, delay)
         if abs(shift - before) <= (late.standard_error or 0.0):
             shift = before
-            # Beside gravity no ripple shows: it is looked for again in what the new terms leave.
+            # Gravity may hide a ripple: search again in the residuals of the new terms.
             again = _period(motions, more[picked].terms, filtering, shift)
             if again == period or repeats(more[picked]):
                 break
     else:
         more = [structure(motions, each.terms, filtering, shift) for each in more]
     offset = len(plain)
-    found = [(each, 0.0) for each in plain] + [(each, shift) for each in more]
+    structures = [(each, 0.0) for each in plain] + [(each, shift) for each in more]
     picked += offset
     unseen_motions = [each.motion for each in unseen]
-    told = {*range(len(plain)), picked}
+    simulated = {*range(len(plain)), picked}
     say("step 3 of 4, predictions")
-    tried = _validated(found, motions, unseen_motions, filtering, told)
+    tried = _validated(structures, motions, unseen_motions, filtering, simulated)
     best = tried[picked]
     say("step 4 of 4, instruments")
     squares = _estimates(best, motions, filtering, late)
@@ -194,13 +194,13 @@ def find(
 
 
 def _plain(motions: Sequence[Motion], filtering: FilterSettings) -> list[Structure]:
-    """The usual models without any delay; of one direction alone only that one's friction."""
+    """The usual models without delay; for a motion in one direction, its friction only."""
     everything = replace(filtering, slowest=0.0)
-    missing = tuple(f"_{way}" for way in never_moved(motions, filtering.slowest))
+    missing = tuple(f"_{direction}" for direction in never_moved(motions, filtering.slowest))
     if not missing:
         sets = (SYMMETRIC, DIRECTIONAL)
         return [structure(motions, [TERMS[n] for n in names], everything) for names in sets]
-    # Dry friction and a constant force are one column there, and standstill tells neither.
+    # Here dry friction and a constant force are one column; standstill determines neither.
     names = [name for name in DIRECTIONAL if not name.endswith(missing)]
     moving_only = filtering if filtering.slowest > 0 else everything
     return [structure(motions, [TERMS[name] for name in names], moving_only)]
@@ -218,10 +218,10 @@ def _delay(
 
 
 def _taken_out(late: Estimate, stated: float | None) -> float:
-    """The delay that is reckoned with: one that was found where scatter alone does not explain it.
+    """The delay (s) to remove: the stated one, or an estimate whose interval excludes zero; or 0.
 
-    It predicts what comes, be it a delay or what a loop makes of noise; how far the two may be
-    apart is in the systematic part of every coefficient.
+    It improves predictions, whether it is a true delay or a loop's reaction to noise. The
+    systematic part of every coefficient includes the difference between the two.
     """
     low, high = late.low, late.high
     sure = low is not None and high is not None and (low > 0 or high < 0)
@@ -236,11 +236,11 @@ def _candidates(
         names.append(("gravity_sine", "gravity_cosine"))
     if all(motion.temperature is not None for motion in motions):
         names += [("coulomb_over_temperature",), ("viscous_over_temperature",)]
-    found: list[Sequence[Term]] = [[TERMS[name] for name in group] for group in names]
+    candidates: list[Sequence[Term]] = [[TERMS[name] for name in group] for group in names]
     if period is not None:
         waves = periodic(period)
-        found += [waves[:2], waves[2:]]
-    return found
+        candidates += [waves[:2], waves[2:]]
+    return candidates
 
 
 def _period(
@@ -255,7 +255,7 @@ def _period(
 
 
 def repeats(which: Structure) -> bool:
-    """Whether something that repeats over position is in it."""
+    """Whether a structure has a term that is periodic over position."""
     return any(name.startswith(("cogging", "ripple")) for name in which.names)
 
 
@@ -266,8 +266,8 @@ def _validated(
     filtering: FilterSettings,
     moved: Collection[int],
 ) -> list[CandidateFit]:
-    """Each structure with its predictions of what it was not fitted to; some also as they move."""
-    told: list[CandidateFit] = []
+    """Fits with their predictions of `unseen`; those at indices `moved` with a simulated rate."""
+    fits: list[CandidateFit] = []
     reference: tuple[Prediction, ...] = ()
     for index, (which, delay) in enumerate(found):
         predictions = tuple(predicted(motion, which, filtering, delay) for motion in unseen)
@@ -280,8 +280,8 @@ def _validated(
             whole = together(predictions)
             gain = improvement("gain", together(reference), whole) if reference else None
             one = replace(one, validation=relative_error("validation", whole), gain=gain)
-        told.append(one)
-    return told
+        fits.append(one)
+    return fits
 
 
 def _simulated(motions: Sequence[Motion], which: Structure, delay: float) -> float:
@@ -294,13 +294,13 @@ def _simulated(motions: Sequence[Motion], which: Structure, delay: float) -> flo
 def predicted(
     motion: Motion, which: Structure, filtering: FilterSettings, delay: float
 ) -> Prediction:
-    """What a structure says of another motion."""
+    """Force of another motion, predicted by a structure."""
     piece = all_rows(motion, which.terms, filtering, delay)
     return Prediction(piece.time, piece.force, piece.columns @ which.fit.values)
 
 
 def together(predictions: Sequence[Prediction]) -> Prediction:
-    """Several motions as one."""
+    """Predictions of several motions, concatenated."""
     return Prediction(
         np.concatenate([each.time for each in predictions]),
         np.concatenate([each.force for each in predictions]),
@@ -311,7 +311,7 @@ def together(predictions: Sequence[Prediction]) -> Prediction:
 def _estimates(
     best: CandidateFit, motions: Sequence[Motion], filtering: FilterSettings, late: Estimate
 ) -> dict[str, Estimate]:
-    """The chosen terms: scatter with autocorrelation; band and delay as systematic parts."""
+    """Estimates of the chosen terms; systematic: band, slow rows, delay, temperature."""
     fit, terms = best.structure.fit, best.structure.terms
     parts = {
         "band": shifts(fit, motions, terms, [filtering.half_band], best.delay),
@@ -330,7 +330,7 @@ def _estimates(
 def _moved_by(
     bends: Sequence[Term], best: CandidateFit, motions: Sequence[Motion], filtering: FilterSettings
 ) -> Array | None:
-    """How far coefficients go with further terms, shape (k,); None where these are not told."""
+    """Changes of coefficients by further terms, shape (k,); None if those are not determined."""
     own = best.structure
     try:
         other = structure(motions, (*own.terms, *bends), filtering, best.delay)
@@ -342,10 +342,10 @@ def _moved_by(
 def _without_shares(
     estimates: Mapping[str, Estimate], terms: Sequence[Term]
 ) -> dict[str, Estimate]:
-    """Without intervals of friction where a term that bends was added because it fits better.
+    """Estimates without intervals of friction if the terms include one that is nonlinear in rate.
 
-    It stands for any curvature of friction, most often a Stribeck curve; what is called Coulomb
-    and viscous friction then takes what is too much of it elsewhere.
+    That term approximates any curvature of friction, most often a Stribeck curve. Coulomb and
+    viscous friction then compensate its error at other rates.
     """
     if not any(term.family == "bend" for term in terms):
         return dict(estimates)
@@ -361,7 +361,7 @@ def _without_shares(
 
 
 def _doubt(best: CandidateFit, late: Estimate, motion: Motion) -> float:
-    """By how much the delay may be wrong (s, 1 sigma): a sample where it was not taken out."""
+    """Uncertainty of the delay (s, 1 sigma); a sample interval if no delay was removed."""
     if best.delay == 0.0 or math.isnan(late.half_width):
         return 1.0 / motion.sample_rate
     return late.half_width / NORMAL_95

@@ -1,8 +1,8 @@
 """Inverse dynamics of any motion: inertia and friction by regression of the force.
 
-The force of a motion is a sum of terms (`estimation.inverse.terms`); their coefficients follow
-from least squares on filtered rows, with deviations that know of autocorrelation, and are held
-against instruments from a simulated motion. Delay first, then structure.
+The force of a motion is a sum of terms (`estimation.inverse.terms`). Least squares on filtered rows
+estimates their coefficients, with deviations that include autocorrelation. Instruments from a
+simulated motion check them. The delay is estimated first, then the structure.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ BENCH = {
     "viscous_negative": f"{FRICTION}.negative.viscous_friction",
     "inertia": "axis.inertia",
 }
-"""Where coefficients go that a bench has a place for: a plain friction model of steady sliding."""
+"""Bench keys of coefficients: a plain friction model of steady sliding, and the inertia."""
 PLAIN = frozenset(BENCH) | {"offset"}
 NO_BASE = Cause(
     "no base", "neither inertia nor dry friction is determined, so that nothing beside them is"
@@ -66,7 +66,7 @@ ADVICE = {
     "gravity": "move over more of the travel",
     "offset": "move as much in one direction as in the other",
 }
-"""By the beginning of a term's name: what tells its coefficient better."""
+"""What determines a coefficient better, by the beginning of its term's name."""
 
 
 def _known(name: str) -> str:
@@ -94,11 +94,11 @@ class InverseDynamicsOptions(Options):
 
 
 def identify(data: TestData, options: InverseDynamicsOptions) -> Result:
-    """From all trials together. Raises ValueError where they tell nothing."""
+    """Result of all trials together. Raises ValueError if they determine nothing."""
     data.say("step 1 of 4, the motion")
     filtering, pieces, unseen = read(data, options.low_pass, options.decimation, options.skip)
     filtering = with_slowest(filtering, pieces, options.slowest)
-    found = find(
+    fit = find(
         pieces,
         unseen,
         filtering,
@@ -107,21 +107,19 @@ def identify(data: TestData, options: InverseDynamicsOptions) -> Result:
         linear=data.bench.is_linear,
         say=data.say,
     )
-    parameters = tuple(_parameters(found, data))
+    parameters = tuple(_parameters(fit, data))
     return Result(
-        tables=tuple(_tables(found)),
-        figures=tuple(figures(found)),
+        tables=tuple(_tables(fit)),
+        figures=tuple(figures(fit)),
         findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-        notes=tuple(_notes(found, data)),
+        notes=tuple(_notes(fit, data)),
         identified=IdentifiedRig(
             parameters,
-            correlations=_correlations(found),
+            correlations=_correlations(fit),
             settings=_settings(parameters, data),
-            # A ripple has a period that was found; another recording may not show it.
-            again={"terms": tuple(name for name in found.best.structure.names if name in TERMS)},
-            unseen=Unseen(found.best.validation.value)
-            if found.best.validation is not None
-            else None,
+            # The period of a ripple was searched; another recording may not show it.
+            again={"terms": tuple(name for name in fit.best.structure.names if name in TERMS)},
+            unseen=Unseen(fit.best.validation.value) if fit.best.validation is not None else None,
         ),
     )
 
@@ -135,11 +133,11 @@ def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
     }
     scaled = {name: with_constants(one, data) for name, one in found.estimates.items()}
     admitted = _with_slope(admitted_together(scaled, found.matters))
-    told = with_offset(_with_base(admitted), "coulomb")
-    dry = [one for name, one in told.items() if name.startswith("coulomb") and name in BENCH]
+    parameters = with_offset(_with_base(admitted), "coulomb")
+    dry = [one for name, one in parameters.items() if name.startswith("coulomb") and name in BENCH]
     slides = _is_plain(found) and not one_way(found) and all(map(is_value, dry))
     for term in found.best.structure.terms:
-        one = told[term.name]
+        one = parameters[term.name]
         bench = BENCH.get(term.name, "") if slides or term.name == "inertia" else ""
         needs = "viscous" if one.reason in NO_SLOPE else term.name
         advice = next((text for key, text in ADVICE.items() if needs.startswith(key)), "")
@@ -165,9 +163,9 @@ def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
 
 
 def _with_slope(told: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Dry friction is the intercept of a line over rates that go beyond a Stribeck curve.
+    """Refuse dry friction where viscous friction is not determined.
 
-    Where such a line need not rise, rates as after a breakaway tell static friction.
+    Dry friction is the intercept of a line over rate; without a slope it may be static friction.
     """
     level = {
         name.replace("viscous", "coulomb")
@@ -182,7 +180,7 @@ def _with_slope(told: dict[str, Estimate]) -> dict[str, Estimate]:
 
 
 def _with_base(told: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Further terms are told beside inertia or dry friction, and not alone: the rest of nothing."""
+    """Refuse further terms if neither inertia nor dry friction is determined."""
     base = {name for name in told if name == "inertia" or name.startswith("coulomb")}
     if any(told[name].origin is not Origin.NOT_DETERMINED for name in base):
         return told
@@ -195,10 +193,12 @@ def _with_base(told: dict[str, Estimate]) -> dict[str, Estimate]:
 
 
 def one_way(found: InverseDynamics) -> str:
-    """The only direction it moves in; empty where it does in both."""
+    """The only direction of the motion; empty if the axis moves in both."""
     names = set(found.best.structure.names)
-    ways = [way for way in ("positive", "negative") if f"coulomb_{way}" in names]
-    return ways[0] if len(ways) == 1 else ""
+    directions = [
+        direction for direction in ("positive", "negative") if f"coulomb_{direction}" in names
+    ]
+    return directions[0] if len(directions) == 1 else ""
 
 
 def _is_plain(found: InverseDynamics) -> bool:
@@ -240,9 +240,9 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
     late = found.delay
     if math.isnan(late.value):
         yield f"The delay of the force is not determined: {late.reason}."
-    if way := one_way(found):
+    if side := one_way(found):
         yield (
-            f"The axis moves in the {way} direction only: friction of the other is not known. "
+            f"The axis moves in the {side} direction only: friction of the other is not known. "
             "Coulomb friction includes every constant force, such as a weight or a sensor's zero. "
             "Friction goes to no bench file."
         )
@@ -280,17 +280,17 @@ def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
 def _settings(
     parameters: Sequence[Parameter], data: TestData
 ) -> dict[str, tuple[object, str, str]]:
-    """What a bench's friction needs besides: no Stribeck part was looked for, so it has none."""
+    """Further bench keys: the plain model; viscous friction 0 if only a bound is known."""
     if "load" in data.bench.friction:
         return {}
     by_name = {each.estimate.name: each for each in parameters}
     coulomb = by_name.get("coulomb", by_name.get("coulomb_positive"))
     if coulomb is None or not coulomb.bench:
         return {}
-    told: dict[str, tuple[object, str, str]] = {
+    settings: dict[str, tuple[object, str, str]] = {
         f"{FRICTION}.model": ("coulomb", "", "the plain friction of steady sliding"),
     }
     for name, each in by_name.items():
         if name in BENCH and name.startswith("viscous") and not each.bench:
-            told[BENCH[name]] = (0.0, "N m s/rad", "of it only an upper bound is known")
-    return told
+            settings[BENCH[name]] = (0.0, "N m s/rad", "of it only an upper bound is known")
+    return settings

@@ -38,30 +38,30 @@ from campaign.trial import Recording
 ROWS, FEWEST_ROWS = 20.0, 25.0
 """of a commanded sum of sines: per period of its highest frequency, and per second at least."""
 SLOWEST = 0.02
-"""of the fastest rate: what is slower counts as standing still, where nobody says otherwise."""
+"""of the fastest rate: default of the rate below which the axis is at standstill."""
 MOST_SAMPLES = 5_000_000
-"""of all trials together that are read; further trials are left out, and it is told."""
+"""Largest number of samples of all trials together; further trials are left out."""
 SHORTEST_PIECE = 1.0
-"""s of a motion without a lost sample, to be used; or most of its trial."""
+"""s; shortest usable motion without a lost sample, or `MOST` of its trial if that is shorter."""
 MOST = 0.9
 """of a trial."""
 FORCES = (DRIVE_TORQUE, JOINT_TORQUE)
-"""What moves the axis, the better first: a sensor at the load knows nothing of motor and gear."""
+"""Force channels, the better first: a sensor at the load does not measure motor and gear."""
 FEWEST_SAMPLES = 100
 """of a piece without a lost sample."""
 FORCE = "force"
 RATES_ALIKE = 1.01
-"""Largest over smallest sample rate up to which trials have one: times of files are rounded, and
-what was resampled has the mean step of its own trial."""
+"""Largest ratio of sample rates that count as equal: times of files are rounded, and a resampled
+trial has its own mean step."""
 ONE_WAY = 0.02
-"""Share of the moving samples up to which a direction counts as one that nothing moves in."""
+"""Largest share of the moving samples in a direction that counts as one without motion."""
 
 
 @dataclass(frozen=True)
 class MotionPiece:
-    """A piece of a trial as it moved, and as it was meant to; None where nobody recorded that.
+    """A piece of a trial: measured and commanded motion; None if no command was recorded.
 
-    of_rate: whether a rate was measured, and its position is no more than what that adds up to.
+    of_rate: whether the rate was measured and the position is its integral.
     """
 
     trial: int
@@ -70,34 +70,35 @@ class MotionPiece:
     of_rate: bool = False
 
     def part(self, which: slice) -> MotionPiece:
-        """Samples of it that follow each other."""
+        """A slice of its samples."""
         wanted = None if self.wanted is None else self.wanted.part(which)
         return replace(self, motion=self.motion.part(which), wanted=wanted)
 
 
 def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
-    """Trials with a force and a motion, or why there are none; too many are cut."""
-    found: list[TrialData] = []
+    """Trials with a force and a motion, up to `MOST_SAMPLES`, or why there are none."""
+    usable_trials: list[TrialData] = []
     samples = 0
     for each in trials:
         names = each.channel_names()
         if not names & {*FORCES} or not names & {RELATIVE_ANGLE, RELATIVE_RATE}:
             continue
         samples += round(each.trial.task.duration * each.trial.task.sample_rate)
-        if found and samples > MOST_SAMPLES:
+        if usable_trials and samples > MOST_SAMPLES:
             break
-        found.append(each)
-    if not found:
+        usable_trials.append(each)
+    if not usable_trials:
         force = f"{DRIVE_TORQUE} or {JOINT_TORQUE}"
         return (), f"no trial has {force}, and {RELATIVE_ANGLE} or {RELATIVE_RATE}"
-    return found, ""
+    return usable_trials, ""
 
 
 def read(
     data: TestData, low_pass: float | None, decimation: int | None, skip: float
 ) -> tuple[FilterSettings, tuple[MotionPiece, ...], tuple[MotionPiece, ...]]:
-    """How motions are filtered, with defaults for the sample rate; all pieces of the trials, and
-    those of the validation. Raises ValueError where either have none.
+    """Filter settings, with defaults for the sample rate; pieces of the trials and the validation.
+
+    Raises ValueError if either has no usable piece.
     """
     rate = data.trials[0].trial.task.sample_rate
     plain = FilterSettings.for_rate(rate)
@@ -113,7 +114,7 @@ def read(
 
 
 def rows_of(trials: Sequence[TrialData]) -> float:
-    """Rows per second that slow sums of sines need: those of friction in reversals are more."""
+    """Rows per second: fewer for slow sums of sines, else enough for friction in reversals."""
     highest = 0.0
     for task in (each.trial.task for each in trials):
         if task.mode != "rate" or not isinstance(task.command, MultiSine):
@@ -123,27 +124,27 @@ def rows_of(trials: Sequence[TrialData]) -> float:
 
 
 def moved(trials: Sequence[TrialData], filtering: FilterSettings) -> tuple[MotionPiece, ...]:
-    """All pieces of all trials without a lost sample. Raises ValueError without any."""
-    found = tuple(piece for each in trials for piece in _pieces(each, filtering))
-    if not found:
+    """Pieces without a lost sample of all trials. Raises ValueError if they do not suit a fit."""
+    pieces = tuple(piece for each in trials for piece in _pieces(each, filtering))
+    if not pieces:
         raise ValueError(
             f"nothing is recorded for {SHORTEST_PIECE:g} s without a lost sample, and no whole "
             f"trial with {FEWEST_SAMPLES} samples"
         )
-    if not any(np.any(each.motion.force) for each in found):
+    if not any(np.any(each.motion.force) for each in pieces):
         raise ValueError(f"{force_of(trials[0])} is zero throughout")
-    if not any(_moves(each, filtering.low_pass) for each in found):
-        if all(each.of_rate for each in found):
+    if not any(_moves(each, filtering.low_pass) for each in pieces):
+        if all(each.of_rate for each in pieces):
             raise ValueError("the rate is constant but for its sensor's noise")
         raise ValueError("the axis stands still: what it moves is no more than its sensor's noise")
-    rates = [each.motion.sample_rate for each in found]
+    rates = [each.motion.sample_rate for each in pieces]
     if max(rates) > RATES_ALIKE * min(rates):
-        told = ", ".join(dict.fromkeys(f"{rate:.4g} Hz" for rate in sorted(rates)))
+        shown = ", ".join(dict.fromkeys(f"{rate:.4g} Hz" for rate in sorted(rates)))
         raise ValueError(
-            f"the trials have several sample rates ({told}), and one fit takes one: name a test "
+            f"the trials have several sample rates ({shown}), and one fit takes one: name a test "
             "whose trials share it, as in `campaign identify RUN:TEST`"
         )
-    return found
+    return pieces
 
 
 def place_and_rate(pieces: Sequence[MotionPiece], filtering: FilterSettings) -> Array:
@@ -153,13 +154,13 @@ def place_and_rate(pieces: Sequence[MotionPiece], filtering: FilterSettings) -> 
 
 
 def force_of(trial: TrialData) -> str:
-    """The channel that is taken for what moves the axis."""
+    """The channel used as the force: the first of `FORCES` that the trial has."""
     names = trial.channel_names()
     return next((name for name in FORCES if name in names), DRIVE_TORQUE)
 
 
 def with_constants(one: Estimate, data: TestData) -> Estimate:
-    """With what a wrong constant of the force would do to it; of a time that is nothing."""
+    """An estimate with the systematic parts of the force's constants; a time has none."""
     if not one.unit.startswith(("N", "kg")) or one.origin is Origin.NOT_DETERMINED:
         return one
     first = data.trials[0]
@@ -169,11 +170,10 @@ def with_constants(one: Estimate, data: TestData) -> Estimate:
 
 
 def _moves(piece: MotionPiece, low_pass: float) -> bool:
-    """Whether what was measured goes further than from one independent sample to the next.
+    """Whether the measured signal varies more than from one independent sample to the next.
 
-    What is left of white noise behind its low-pass does not: its samples twice a period of the
-    corner apart differ by 1.4 times of how far they scatter. The sum of a rate's noise does, and
-    tells nothing.
+    Low-passed white noise does not: its samples half a period of the corner apart differ by 1.4
+    times their deviation. A position integrated from a noisy rate would; so the rate is used there.
     """
     motion = piece.motion
     measured = motion.rate if piece.of_rate else motion.position
@@ -182,22 +182,22 @@ def _moves(piece: MotionPiece, low_pass: float) -> bool:
 
 
 def never_moved(motions: Sequence[Motion], slowest: float) -> tuple[str, ...]:
-    """Directions in which nothing moves faster than `slowest` (SI), but for a few samples' noise.
+    """Directions without motion faster than `slowest` (SI), except for a few noisy samples.
 
-    Raises ValueError where that are both.
+    Raises ValueError if neither direction has any.
     """
     rate = np.concatenate([motion.rate for motion in motions])
     count = {"positive": np.sum(rate > slowest), "negative": np.sum(rate < -slowest)}
     total = sum(count.values())
     if total == 0:
         raise ValueError("the axis never moves faster than what counts as standing still")
-    return tuple(way for way, samples in count.items() if samples <= ONE_WAY * total)
+    return tuple(direction for direction, samples in count.items() if samples <= ONE_WAY * total)
 
 
 def with_slowest(
     filtering: FilterSettings, pieces: Sequence[MotionPiece], slowest: float | None
 ) -> FilterSettings:
-    """With the rate (SI) below which the axis stands still; None: a share of its fastest."""
+    """Settings with the rate (SI) below which the axis is at standstill; None: a default share."""
     if slowest is None:
         slowest = SLOWEST * max(float(np.abs(each.motion.rate).max()) for each in pieces)
     return replace(filtering, slowest=slowest)
@@ -225,7 +225,7 @@ def _pieces(archived: TrialData, filtering: FilterSettings) -> Iterator[MotionPi
 
 
 def _sources(recording: Recording, force: str) -> list[str]:
-    """Channels that are read: an angle rather than a rate, a gyro for what is accelerated."""
+    """Channels to read: the angle if recorded, else the rate; the gyro for the acceleration."""
     names = [force]
     names.append(RELATIVE_ANGLE if RELATIVE_ANGLE in recording.channels else RELATIVE_RATE)
     names += [name for name in (TEMPERATURE, REFERENCE) if name in recording.channels]
@@ -245,7 +245,7 @@ def _motion(time: Array, parts: dict[str, Array], filtering: FilterSettings) -> 
         motion = motion_of_rate(time, parts[RELATIVE_RATE], force, filtering.low_pass, warm)
     if GYRO_RATE not in parts:
         return motion
-    # What is accelerated is the load in space; friction goes by its rate against the hull.
+    # Inertia acts on the load's motion in space, friction on its rate relative to the hull.
     inertial = zero_phase(parts[GYRO_RATE], filtering.low_pass, motion.sample_rate)
     return replace(motion, acceleration=np.gradient(inertial, 1.0 / motion.sample_rate))
 
@@ -253,9 +253,9 @@ def _motion(time: Array, parts: dict[str, Array], filtering: FilterSettings) -> 
 def _wanted(time: Array, parts: dict[str, Array], filtering: FilterSettings) -> Motion | None:
     force, warm = parts[FORCE], parts.get(TEMPERATURE)
     if REFERENCE in parts:
-        found = motion_of_position(time, parts[REFERENCE], force, filtering.low_pass, warm)
+        motion = motion_of_position(time, parts[REFERENCE], force, filtering.low_pass, warm)
     elif COMMAND in parts:
-        found = motion_of_rate(time, parts[COMMAND], force, filtering.low_pass, warm)
+        motion = motion_of_rate(time, parts[COMMAND], force, filtering.low_pass, warm)
     else:
         return None
-    return found if np.ptp(found.rate) > 0 else None
+    return motion if np.ptp(motion.rate) > 0 else None

@@ -14,7 +14,7 @@ from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 
 STRONG = 0.9
-"""Correlation from which on two coefficients are told to go together."""
+"""Smallest magnitude of a correlation that is reported."""
 AS_THEY_ARE = Cause("sum over rows", "a sum over all rows; blocks show how it varies")
 DEVIATION = Cause("deviation", "a deviation, not a quantity of the rig")
 
@@ -24,11 +24,11 @@ COMPARED = (
     Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
     Column("criterion", "BIC", exact=True),
 )
-"""Columns by which fits are compared."""
+"""Columns that compare fits."""
 
 
 def validation_columns(first: str) -> tuple[Column, Column]:
-    """Of the validation, and of the gain over the `first` fit."""
+    """Columns of the validation residual and its reduction against the `first` fit."""
     return (
         Column("validation", "Validation", "", "percent"),
         Column("gain", f"Lower than {first} by", "", "percent"),
@@ -36,7 +36,7 @@ def validation_columns(first: str) -> tuple[Column, Column]:
 
 
 def structures_table(found: InverseDynamics) -> Table:
-    """Every structure that was tried: how well it does on its rows, on blocks, on other motions."""
+    """All structures: residuals on their rows, on blocks left out, and on the validation."""
     columns = [
         Column("terms", "Terms"),
         Column("delay", "Delay", "s", "ms", exact=True),
@@ -65,22 +65,22 @@ def structures_table(found: InverseDynamics) -> Table:
         "rows by what they are worth, and compares structures of one delay; “rate after 1 s”: the "
         "motion that the model makes of the recorded force, released every second"
     )
-    told = (
+    gain = (
         ". “Lower than plain by”: the validation residual of both directions without delay less "
         "this one's, on the same rows."
     )
     return Table(
-        "structures", "Fitted structures", tuple(columns), tuple(rows), note=note + told * validated
+        "structures", "Fitted structures", tuple(columns), tuple(rows), note=note + gain * validated
     )
 
 
 def formula(tried: CandidateFit) -> str:
-    """`a, v+, v-, (v > 0), -(v < 0), q`."""
+    """Symbols of the terms: `a, v+, v-, (v > 0), -(v < 0), q`."""
     return ", ".join(term.symbol for term in tried.structure.terms)
 
 
 def deviations_table(key: str, title: str, tried: CandidateFit) -> Table:
-    """Coefficients of one structure with ordinary deviations and those with autocorrelation."""
+    """Coefficients of one structure with ordinary and autocorrelation-consistent deviations."""
     fit = tried.structure.fit
     half, rule, twice = fit.by_bandwidth
     reason = DEVIATION()
@@ -117,7 +117,7 @@ def deviations_table(key: str, title: str, tried: CandidateFit) -> Table:
 
 
 def instruments_table(found: InverseDynamics, held: Instruments) -> Table:
-    """Least squares beside instruments, and which of the two is told."""
+    """Estimates by least squares and by instruments; the note states which are reported."""
     rows: list[Mapping[str, Cell]] = [
         {
             "term": term.name,
@@ -145,7 +145,7 @@ def instruments_table(found: InverseDynamics, held: Instruments) -> Table:
 
 
 def instruments_note(found: InverseDynamics) -> str:
-    """What the comparison comes to."""
+    """Conclusion of the comparison of least squares and instruments; empty without instruments."""
     held = found.instruments
     if held is None:
         return ""
@@ -173,7 +173,7 @@ def instruments_note(found: InverseDynamics) -> str:
 
 
 def correlated(fit: Regression, terms: tuple[Term, ...]) -> Iterator[tuple[str, str, float]]:
-    """Pairs of coefficients that go together, the strongest first."""
+    """Pairs of coefficients with a correlation of `STRONG` or more, the strongest first."""
     matrix = fit.correlation
     pairs = [
         (terms[i].name, terms[j].name, float(matrix[i, j]))

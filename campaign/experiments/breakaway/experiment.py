@@ -1,8 +1,8 @@
-"""Breakaway: a slow torque ramp from rest, and what the presliding curve says (section 4.3.3).
+"""Breakaway: a slow torque ramp from rest, with its presliding curve (section 4.3.3).
 
 The loop is open; the drive torque rises until the load slides. The torque at that moment is the
-breakaway torque, the start of the friction-position curve gives the bristle stiffness sigma0, and
-an *assumed* damping ratio gives sigma1, which the ramp itself does not show.
+breakaway torque. The start of the friction-position curve gives the bristle stiffness sigma0. An
+*assumed* damping ratio gives sigma1, which the ramp does not show.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ FOR_ORIENTATION = Cause(
 )
 BY_CRITERION = Cause("chosen by a criterion", "chosen by the Bayesian information criterion")
 OWN = ("measurement", "position", "direction")
-"""What distinguishes the ramps of one group."""
+"""Conditions in which the ramps of one group differ."""
 
 
 def default_positions() -> tuple[float, ...]:
@@ -123,7 +123,7 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
     windows = windows_of(options)
     _, ramp = windows
     ends = stop_rate(options.sliding_rate, Rig(bench).rate_step)
-    places = [(way, position) for way in options.directions for position in options.positions]
+    places = [(side, position) for side in options.directions for position in options.positions]
     for number, (direction, position) in enumerate(places, start=1):
         peak = WAYS[direction] * options.peak_torque
         yield TrialRequest(
@@ -153,17 +153,17 @@ def _warnings(options: BreakawayOptions, bench: Bench) -> Iterator[str]:
 def _found(
     options: BreakawayOptions, bench: Bench, offered: OfferedRecording
 ) -> Iterator[TrialRequest]:
-    """The ramp of a recording that nobody planned: up to when the load first slides."""
+    """The ramp in an unplanned recording, until the load first slides."""
     known = {RELATIVE_ANGLE} & offered.channels
     recording = offered.read([GYRO_RATE, DRIVE_TORQUE, *known])
-    seen = _resolved(recording, options.sliding_rate, own_sensor=False)
-    threshold = max(options.sliding_rate, seen.finest)
-    slides = slides_from(seen.values, threshold)
+    resolved = _resolved(recording, options.sliding_rate, own_sensor=False)
+    threshold = max(options.sliding_rate, resolved.finest)
+    slides = slides_from(resolved.values, threshold)
     if slides is None:
         raise ValueError(f"the load never slides at {rate_text(threshold)} (sliding_rate)")
     ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], float(recording.time[slides[0]]))
-    # And what the smoothing needs behind it.
-    stop = min(offered.duration, float(recording.time[slides[1] - 1]) + 0.5 * seen.window)
+    # The smoothing needs half of its window after that.
+    stop = min(offered.duration, float(recording.time[slides[1] - 1]) + 0.5 * resolved.window)
     coarse = ""
     if threshold > options.sliding_rate:
         coarse = f"; sliding is {rate_text(threshold)}, the least that its sensor resolves"
@@ -189,8 +189,8 @@ def _found(
 def _resolved(recording: Recording, finest: float, *, own_sensor: bool) -> RelativeRate:
     """The rate of a recording, smoothed until its sensor resolves `finest` (rad/s).
 
-    It may be made of an encoder's counts, of which each is many times as fast; of an imported rate
-    nobody tells. It is then the slope of the angle.
+    A rate made of encoder counts is replaced by the slope of the angle: one count is many times as
+    fast. `own_sensor`: whether the rate is known to have its own sensor; imported rates are not.
     """
     angle = recording[RELATIVE_ANGLE] if RELATIVE_ANGLE in recording.channels else None
     rate, step = recording[GYRO_RATE], _step(recording)
@@ -204,7 +204,7 @@ def _step(recording: Recording) -> float:
 
 
 def windows_of(options: BreakawayOptions) -> tuple[Window, Window]:
-    """Standstill and ramp, for the plan and for recordings of a plan that did not name them."""
+    """Windows of standstill and ramp, for the plan and for archived plans without windows."""
     stop = options.rest + options.peak_torque / options.torque_rate
     return Window("rest", 0.0, options.rest), Window("ramp", options.rest, stop)
 
@@ -218,42 +218,42 @@ def _options(trial: Trial) -> BreakawayOptions:
 
 
 def direction_of(trial: Trial) -> str:
-    """Which way the load was turned; before it was an option it was the positive."""
+    """Direction of a ramp; positive for archived trials that do not state it."""
     return str(trial.point.get("direction", "positive"))
 
 
 def _samples(data: TrialData) -> tuple[Array, Array, Array]:
-    """Time (s), rate (rad/s) and drive torque (N m), turned so that the ramp rises; (n,).
+    """Time (s), rate (rad/s) and drive torque (N m), with signs of a rising ramp; each (n,).
 
-    Of an executed ramp a rate of counts is differenced anew, what is below one of them is lost
-    else; and the torque counts from what its sensor shows at rest.
+    For an executed ramp, a rate made of counts is differentiated again from the angle, so that it
+    resolves less than one count. The torque is relative to its mean at rest.
     """
-    recording, way = data.recording(), WAYS[direction_of(data.trial)]
+    recording, sign = data.recording(), WAYS[direction_of(data.trial)]
     time, rate, torque = recording.time, recording[GYRO_RATE], recording[DRIVE_TORQUE]
     if data.trial.recording:
-        return time, way * rate, way * torque
+        return time, sign * rate, sign * torque
     if RELATIVE_ANGLE in recording.channels:
         angle, step = recording[RELATIVE_ANGLE], _step(recording)
         if bench_of(data.trial).rate_is_of_encoder or made_of_counts(rate, angle, step):
             rate = np.gradient(angle, step)
-    # At rest no torque is commanded: what is shown is the zero of its sensor.
+    # At rest no torque is commanded: the mean is the zero of the sensor.
     rest = _windows(data.trial, _options(data.trial))["rest"]
     zero = torque[(time >= rest.start) & (time < rest.stop)]
     zero = zero[np.isfinite(zero)]
-    return time, way * rate, way * (torque - (np.mean(zero) if len(zero) else 0.0))
+    return time, sign * rate, sign * (torque - (np.mean(zero) if len(zero) else 0.0))
 
 
 def _seen(data: TrialData, finest: float) -> Array:
-    """The rate (rad/s) by which a ramp's load slides, turned so that the ramp rises; (n,)."""
+    """The smoothed rate (rad/s) that detects sliding, with the sign of a rising ramp; (n,)."""
     own_sensor = not (data.trial.recording or bench_of(data.trial).rate_is_of_encoder)
     seen = _resolved(data.recording(), finest, own_sensor=own_sensor)
     return WAYS[direction_of(data.trial)] * seen.values
 
 
 def curve_of(data: TrialData, breakaway: float) -> Presliding:
-    """The curve of bristles of a ramp whose load slides at `breakaway` (N m).
+    """The presliding curve of a ramp whose load slides at `breakaway` (N m).
 
-    Raises ValueError where the ramp shows too little of it.
+    Raises ValueError if the ramp does not show enough of it.
     """
     options = _options(data.trial)
     start = _windows(data.trial, options)["ramp"].start
@@ -261,23 +261,23 @@ def curve_of(data: TrialData, breakaway: float) -> Presliding:
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """Breakaway torque; where the curve of bristles shows, stiffness and what follows from it."""
+    """Breakaway torque and, if the curve can be fitted, stiffness with quantities from it."""
     options, bench = _options(data.trial), bench_of(data.trial)
     inertia = inertia_of(bench, "friction of a load that gathers speed")
     seen = _seen(data, options.sliding_rate)
     try:
-        found = breakaway_torque(*_samples(data), inertia, options.sliding_rate, seen)
+        breakaway = breakaway_torque(*_samples(data), inertia, options.sliding_rate, seen)
     except ValueError as error:
         if slides_from(seen, options.sliding_rate) is None:
             raise
         raise ValueError(f"{error}; a higher sample_rate holds more of it") from error
-    torque = with_systematic(found.torque, bench, INERTIA, inertia * found.acceleration)
+    torque = with_systematic(breakaway.torque, bench, INERTIA, inertia * breakaway.acceleration)
     torque = _by_torque_constant(torque, bench)
     acceleration = Estimate.without_interval(
-        "peak_acceleration", found.acceleration, "rad/s^2", OF_INERTIA()
+        "peak_acceleration", breakaway.acceleration, "rad/s^2", OF_INERTIA()
     )
     try:
-        curve = curve_of(data, found.torque.value)
+        curve = curve_of(data, breakaway.torque.value)
     except ValueError:
         return torque, acceleration
     if _is_of_any_size(curve.stiffness):
@@ -286,7 +286,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 
 def _is_of_any_size(one: Estimate) -> bool:
-    """Whether a ramp leaves a number open over decades: it would decide the mean of all ramps."""
+    """Whether a number is open over decades: it would dominate the mean of all ramps."""
     return one.origin is Origin.NOT_DETERMINED and not one.has_interval
 
 
@@ -315,11 +315,11 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
 
 
 def _damping(stiffness: Estimate, value: float, slope: float) -> Estimate:
-    """sigma1 (N m s/rad) by an assumed damping ratio, with the interval that the stiffness leaves.
+    """sigma1 (N m s/rad) by an assumed damping ratio, with the interval due to the stiffness.
 
     slope: d sigma1 / d sigma0 (s) of Equation 4.12, with ratio, inertia and viscous friction exact.
     """
-    found = Estimate.without_interval(
+    damping = Estimate.without_interval(
         "bristle_damping",
         value,
         "N m s/rad",
@@ -329,14 +329,14 @@ def _damping(stiffness: Estimate, value: float, slope: float) -> Estimate:
     )
     low, high, error = stiffness.low, stiffness.high, stiffness.standard_error
     if stiffness.kind != "number" or low is None or high is None or error is None:
-        return found
+        return damping
     parts = (
         replace(part, standard_uncertainty=slope * (part.standard_uncertainty or 0.0))
         for part in stiffness.systematic
         if part.standard_uncertainty is not None
     )
     return replace(
-        found,
+        damping,
         low=value + slope * (low - stiffness.value),
         high=value + slope * (high - stiffness.value),
         level=stiffness.level,
@@ -347,7 +347,7 @@ def _damping(stiffness: Estimate, value: float, slope: float) -> Estimate:
 
 
 def _by_torque_constant(estimate: Estimate, bench: Bench) -> Estimate:
-    """Torque and stiffness are as wrong as the torque constant is."""
+    """A torque or stiffness with the systematic part of the torque constant, proportional to it."""
     return with_systematic(estimate, bench, TORQUE_CONSTANT, estimate.value)
 
 
@@ -373,7 +373,7 @@ def _ramps(group: tuple[TrialData, ...]) -> Ramps:
 
 
 def _of_ramps(ramps: Ramps, suffix: str) -> Result:
-    """What the ramps of one place of the sweep show."""
+    """Result of the ramps of one sweep point."""
     means = means_of(ramps)
     return Result(
         (table_of(ramps, means, suffix), *window_table(ramps, suffix)),

@@ -18,15 +18,15 @@ from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, Value
 
 TORQUE = Axis("Drive torque", "N m", "N m")
 OF_A_RAMP = ("measurement", "position", "direction")
-"""Conditions that are a ramp's own, and no mean's."""
+"""Conditions of a single ramp that a mean does not have."""
 NAMED = 12
-"""Most positions that stand at the axis by their angle."""
+"""Largest number of labeled positions at the axis."""
 CHANCE = 0.05
-"""How often ramps that do not differ would be told to in any of their quantities, at most."""
+"""Largest probability of a false difference between ramps, over all quantities."""
 ASIDE = 0.07
-"""How far ramps of a direction are drawn beside their position, in steps from one to the next."""
+"""Offset of the dots of a direction from their position, in position steps."""
 DOTS, SMOOTH = 45, 400
-"""Dots of a measured curve, and shares of it over which its way is smoothed."""
+"""Dots of a measured curve, and number of averages along which its length is measured."""
 
 
 def ramp_figure(
@@ -37,7 +37,7 @@ def ramp_figure(
     place: Mapping[str, Value],
     trials: tuple[int, ...],
 ) -> Figure:
-    """One ramp: time (s), rate (rad/s) and torque (N m), each (n,), to the positive side."""
+    """One ramp. samples: time (s), rate (rad/s) and torque (N m), each (n,), of a rising ramp."""
     time, rate, torque = samples
     axis = Axis("Time", "s", "s")
     low, high = found.window
@@ -83,7 +83,7 @@ def _where(place: Mapping[str, Value]) -> str:
 
 
 def _gives(found: Presliding) -> str:
-    """How the load gives before it slides: true of how many interfaces the curve shows."""
+    """Sentence on the deflection before sliding, for the number of interfaces of the curve."""
     before = "Before that the load already gives, elastically"
     if len(found.interfaces) < 2:
         return f"{before}: the lower curve begins with the stiffness σ0."
@@ -135,15 +135,15 @@ def _presliding(
 
 
 def _some(angle: Array, torque: Array) -> Curve:
-    """Samples evenly along the curve as it is seen: a line of all would lie under the fit."""
+    """Samples evenly spaced along the drawn curve: a line of all would hide under the fit."""
     known = np.isfinite(angle) & np.isfinite(torque)
     x, y = angle[known], torque[known]
-    # Noise would count as way: along the averages of a few samples.
+    # Noise would add length: averages of a few samples have less.
     size = max(1, len(x) // SMOOTH)
     kernel = np.full(size, 1.0 / size)
     rough = [np.convolve(each, kernel, mode="valid") / (np.ptp(each) or 1.0) for each in (x, y)]
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*(np.diff(each) for each in rough)))])
-    places = np.searchsorted(way, np.linspace(0.0, way[-1], DOTS)) + size // 2
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*(np.diff(each) for each in rough)))])
+    places = np.searchsorted(length, np.linspace(0.0, length[-1], DOTS)) + size // 2
     places = np.unique(np.minimum(places, len(x) - 1))
     return Curve(x[places], y[places], "measured", "measured", "points")
 
@@ -168,9 +168,9 @@ def _residual_panel(
 def position_figure(
     ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
 ) -> Figure:
-    """Breakaway torque and stiffness over position, with the interval of each ramp, and means."""
+    """Breakaway torque and stiffness over position, with intervals of the ramps, and means."""
     shown = {"breakaway_torque": "breakaway torque", "bristle_stiffness": "bristle stiffness"}
-    told = [_what_shows(ramps.values(name), word, len(shown)) for name, word in shown.items()]
+    sentences = [_what_shows(ramps.values(name), word, len(shown)) for name, word in shown.items()]
     whole = next(iter(means.values()))  # of both directions, where there are two
     axes = (Axis("Breakaway torque", "N m", "N m"), Axis("σ0", "N m/rad", "N m/mrad"))
     panels = [
@@ -180,7 +180,7 @@ def position_figure(
     return Figure(
         key=f"positions{suffix}",
         title="Breakaway torque and bristle stiffness over position",
-        caption=f"{' '.join(filter(None, told))} {_bars(ramps)}",
+        caption=f"{' '.join(filter(None, sentences))} {_bars(ramps)}",
         alt="Breakaway torque and bristle stiffness, one dot with a bar per ramp, and their mean.",
         panels=tuple(panels),
         across=2,
@@ -189,7 +189,7 @@ def position_figure(
 
 
 def _bars(ramps: Ramps) -> str:
-    """What the bars of single ramps are, where the table has them with more in them."""
+    """Sentence on the bars of single ramps, which may be narrower than intervals of the table."""
     own = "Bars are the 95 % intervals of each ramp alone"
     every = (estimate for each in ramps.found for estimate in each.values())
     if not any(each.has_interval and each.combined != (each.low, each.high) for each in every):
@@ -201,9 +201,9 @@ def _bars(ramps: Ramps) -> str:
 
 
 def _what_shows(found: Sequence[Estimate], word: str, tests: int) -> str:
-    """Whether ramps differ by more than their own intervals explain: a chi-square test.
+    """Sentence on whether ramps differ by more than their own intervals: a chi-square test.
 
-    One of as many `tests`, each of which may be wrong by its share of `CHANCE` (Bonferroni).
+    tests: number of such tests; each has its share of `CHANCE` (Bonferroni).
     """
     from scipy.stats import chi2
 
@@ -227,19 +227,19 @@ def _angles(ramps: Ramps) -> list[float]:
 
 
 def _pitch(angles: Sequence[float]) -> float:
-    """From one position to the next (rad), on average."""
+    """Mean distance of positions (rad), 1 deg at least."""
     return max((angles[-1] - angles[0]) / max(len(angles) - 1, 1), math.radians(1.0))
 
 
 def _behind(angles: Sequence[float]) -> float:
-    """Where the mean stands: right of the last position, clear of it."""
+    """Abscissa of the mean: one step right of the last position."""
     return angles[-1] + _pitch(angles)
 
 
 def _positions(ramps: Ramps) -> Axis:
     angles = _angles(ramps)
     step = -(-len(angles) // NAMED)
-    # At most every other angle has its name: two panels share the width.
+    # Two panels share the width: label every other angle at most.
     step = max(step, 2) if len(angles) > NAMED // 2 else step
     names = tuple((angle, _place(angle)) for angle in angles[::step])
     return Axis("Position", "rad", "rad", places=(*names, (_behind(angles), "mean")))
@@ -265,16 +265,16 @@ def _dots(ramps: Ramps, quantity: str) -> list[Curve]:
     several = len(ramps.directions) > 1
     aside = ASIDE * _pitch(_angles(ramps)) if several else 0.0
     for direction in ramps.directions:
-        # Their own intervals: what all ramps share is in the bar of the mean.
+        # Their own intervals: the bar of the mean includes the common uncertainty.
         shown = {
             float(str(place["position"])): replace(own[quantity], systematic=(), kind="number")
             for place, own in zip(ramps.places, ramps.found, strict=True)
             if quantity in own and place["direction"] == direction
         }
         if shown:
-            way = aside if direction == "positive" else -aside
-            found = list(shown.values())
+            offset = aside if direction == "positive" else -aside
+            estimates = list(shown.values())
             curves.append(
-                Curve.of(list(shown), found, f"{direction} direction", direction, aside=way)
+                Curve.of(list(shown), estimates, f"{direction} direction", direction, aside=offset)
             )
     return curves

@@ -29,7 +29,7 @@ MEASURED = ("breakaway_torque", "bristle_stiffness", "stiffness_at_rest")
 """Quantities that a ramp measures."""
 QUANTITIES = (*MEASURED, "bristle_damping")
 CAUSES = {"ramp rate": "torque_rate", "dwell": "rest"}
-"""What may shift all ramps of a test alike, and the option that would show it when swept."""
+"""Causes that may shift all ramps of a test equally; the option whose sweep shows the shift."""
 BOTH = "both"
 
 
@@ -38,9 +38,9 @@ class Ramps:
     """The ramps of one place in the sweep.
 
     Attributes:
-        trials: that completed.
-        places: conditions of each, with its direction.
-        found: metrics of each by name.
+        trials: completed trials, one for each ramp.
+        places: conditions of each trial, with its direction.
+        found: metrics of each trial, by name.
     """
 
     trials: tuple[TrialData, ...]
@@ -49,11 +49,11 @@ class Ramps:
 
     @property
     def directions(self) -> tuple[str, ...]:
-        """In the order in which they were run."""
+        """Directions in the order of execution."""
         return tuple(dict.fromkeys(str(place["direction"]) for place in self.places))
 
     def values(self, quantity: str, direction: str = BOTH) -> list[Estimate]:
-        """What the ramps of a direction found of a quantity, those that did."""
+        """Estimates of a quantity from the ramps of a direction that have it."""
         return [
             own[quantity]
             for place, own in zip(self.places, self.found, strict=True)
@@ -62,12 +62,12 @@ class Ramps:
 
 
 def means_of(ramps: Ramps) -> dict[str, dict[str, Estimate]]:
-    """Means over the positions by direction (`both` first, where there are two) and quantity."""
+    """Means over positions by direction (`both` first, if there are two) and quantity."""
     by_direction = {
         direction: {
-            quantity: mean(quantity, found)
+            quantity: mean(quantity, values)
             for quantity in QUANTITIES
-            if (found := ramps.values(quantity, direction))
+            if (values := ramps.values(quantity, direction))
         }
         for direction in ramps.directions
     }
@@ -79,23 +79,23 @@ def means_of(ramps: Ramps) -> dict[str, dict[str, Estimate]]:
 
 
 def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
-    """Mean over ramps: Student's t over them, never narrower than their own intervals explain.
+    """Mean over ramps: Student's t over them; the interval is not narrower than theirs imply.
 
-    Ramps without an interval of their own have a mean with one where they scatter so much more than
-    their residuals that these do not matter.
+    If a ramp has no interval, the mean has one only if the ramps scatter at least three times as
+    much as their standard errors explain. A bound among the ramps makes the mean a bound.
     """
     value = float(np.mean([each.value for each in found]))
     unit, count = found[0].unit, len(found)
     systematic = shared_parts(found)
-    told = next((each for each in found if _bound(each) or _assumed(each)), None)
-    if told is not None:
-        lacking = next((each for each in found if math.isnan(_end(each, told))), None)
+    base = next((each for each in found if _bound(each) or _assumed(each)), None)
+    if base is not None:
+        lacking = next((each for each in found if math.isnan(_end(each, base))), None)
         if lacking is not None:
             more = {"systematic": systematic, "origin": lacking.origin}
             return Estimate.without_interval(quantity, value, unit, lacking.reason, **more)
-        value = float(np.mean([_end(each, told) for each in found]))
+        value = float(np.mean([_end(each, base) for each in found]))
         return replace(
-            told, value=value, low=None, high=None, level=None, standard_error=None, freedom=None,
+            base, value=value, low=None, high=None, level=None, standard_error=None, freedom=None,
             systematic=systematic,
         )  # fmt: skip
     own = [each.standard_error or 0.0 for each in found]
@@ -117,12 +117,12 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
 
 
 def _as_assumed(estimate: Estimate, rule: Estimate) -> Estimate:
-    """What follows from a rule, whose interval is of that alone which was measured."""
+    """An estimate with origin and reason of a rule; its interval covers the measured part only."""
     return replace(estimate, origin=rule.origin, reason=rule.reason)
 
 
 def _assumed(estimate: Estimate) -> bool:
-    """Whether it is of a rule alone."""
+    """Whether an estimate is assumed and has no interval."""
     return estimate.origin is Origin.ASSUMED and not estimate.has_interval
 
 
@@ -131,7 +131,7 @@ def _bound(estimate: Estimate) -> bool:
 
 
 def _end(estimate: Estimate, told: Estimate) -> float:
-    """What a number counts for in a mean with bounds like `told`: its end on that side, or NaN."""
+    """Contribution to a mean with bounds like `told`: the end on that side, or NaN without one."""
     if not _bound(told) or estimate.kind == told.kind:
         return estimate.value
     end = estimate.low if told.kind == "at least" else estimate.high
@@ -143,26 +143,26 @@ def _width(estimate: Estimate) -> float:
 
 
 def _between(one: Estimate, other: Estimate) -> Estimate:
-    """Mean of the means of two directions, whose ramps are independent of each other."""
+    """Mean of the means of two directions with independent ramps."""
     systematic = shared_parts((one, other))
-    told = next((each for each in (one, other) if not each.has_interval and not _bound(each)), None)
-    told = told or next((each for each in (one, other) if _bound(each)), None)
-    if told is not None:
-        value = 0.5 * (_end(one, told) + _end(other, told))
-        more = {"origin": told.origin, "kind": told.kind, "method": told.method}
+    base = next((each for each in (one, other) if not each.has_interval and not _bound(each)), None)
+    base = base or next((each for each in (one, other) if _bound(each)), None)
+    if base is not None:
+        value = 0.5 * (_end(one, base) + _end(other, base))
+        more = {"origin": base.origin, "kind": base.kind, "method": base.method}
         return Estimate.without_interval(
-            one.name, value, one.unit, told.reason, systematic=systematic, **more
+            one.name, value, one.unit, base.reason, systematic=systematic, **more
         )
     errors = [each.standard_error or 0.0 for each in (one, other)]
     freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
     value, method = 0.5 * (one.value + other.value), "mean of both directions, Welch"
     error = 0.5 * math.hypot(*errors)
-    found = with_error(one.name, value, one.unit, error, freedom, method, systematic=systematic)
-    return _as_assumed(found, one) if one.origin is Origin.ASSUMED else admitted(found)
+    average = with_error(one.name, value, one.unit, error, freedom, method, systematic=systematic)
+    return _as_assumed(average, one) if one.origin is Origin.ASSUMED else admitted(average)
 
 
 def with_comparisons(groups: Sequence[Ramps]) -> list[Ramps]:
-    """The groups with systematic parts by ramp rate and dwell, as groups beside them show."""
+    """Groups with systematic parts of ramp rate and dwell, from comparison of the groups."""
     return [_compared(ramps, groups) for ramps in groups]
 
 
@@ -172,7 +172,7 @@ def _compared(ramps: Ramps, groups: Sequence[Ramps]) -> Ramps:
         for quantity in MEASURED
         for source in CAUSES
     }
-    found = tuple(
+    metrics = tuple(
         {
             name: _with_parts(each, [(source, sizes[name, source]) for source in CAUSES])
             if name in MEASURED
@@ -181,7 +181,7 @@ def _compared(ramps: Ramps, groups: Sequence[Ramps]) -> Ramps:
         }
         for own in ramps.found
     )
-    return replace(ramps, found=found)
+    return replace(ramps, found=metrics)
 
 
 def _with_parts(estimate: Estimate, parts: Sequence[tuple[str, float | None]]) -> Estimate:
@@ -191,31 +191,28 @@ def _with_parts(estimate: Estimate, parts: Sequence[tuple[str, float | None]]) -
 
 
 def _shift(ramps: Ramps, groups: Sequence[Ramps], quantity: str, source: str) -> float | None:
-    """How far ramp rate or dwell moves a quantity (1 sigma); None where no group beside shows it.
+    """Shift of a quantity by ramp rate or dwell (1 sigma); None if no other group shows it.
 
-    A ramp rate's shift is carried on to the rate zero in a straight line; a dwell's is the
-    difference. Only what is beyond scatter counts.
+    The shift of a ramp rate is extrapolated linearly to rate zero; that of a dwell is the
+    difference. A difference that is not significant counts as 0.
     """
     option = CAUSES[source]
     sizes = []
     for other in groups:
         if not _differ_only_in(option, ramps, other):
             continue
-        here, there = ramps.values(quantity), other.values(quantity)
-        if not here or not there:
+        own, beside = ramps.values(quantity), other.values(quantity)
+        if not own or not beside:
             continue
-        change = difference(quantity, mean(quantity, here), mean(quantity, there), here[0].unit)
-        if change.standard_error is None:
-            sizes.append(abs(change.value))
-            continue
-        free = change.freedom or math.inf
-        significant = abs(change.value) > student(free) * change.standard_error
+        change = difference(quantity, mean(quantity, own), mean(quantity, beside), own[0].unit)
+        scatter = student(change.freedom or math.inf) * (change.standard_error or 0.0)
+        significant = abs(change.value) > scatter
         sizes.append(abs(change.value) * _reach(option, ramps, other) if significant else 0.0)
     return max(sizes) / math.sqrt(3.0) if sizes else None  # evenly likely up to there (GUM 4.3.7)
 
 
 def option_of(ramps: Ramps, name: str) -> float:
-    """An option of the ramps (SI), by its name."""
+    """An option of the ramps (SI) by name; NaN without one."""
     value = ramps.trials[0].trial.options.get(name)
     return float(value) if isinstance(value, int | float) else math.nan
 
@@ -241,7 +238,7 @@ def _rest(ramps: Ramps, option: str) -> dict[str, Value]:
 BREAKAWAY, STRONGEST = "breakaway_torque", "strongest_stiffness"
 WEAKER = "weaker_share"
 OF_RAMPS = {BREAKAWAY: BREAKAWAY, STRONGEST: "bristle_stiffness"}
-"""Numbers of the rig by the quantity that the ramps measure."""
+"""Quantity that the ramps measure, by parameter of the rig."""
 MEANINGS = {
     BREAKAWAY: "Torque at which the load begins to slide.",
     STRONGEST: "Stiffness of the interface that carries the largest torque, by itself.",
@@ -257,9 +254,9 @@ ADVICE = {
 def parameters_of(
     groups: Sequence[Ramps], curve_of: Callable[[TrialData, float], Presliding], notes: list[str]
 ) -> Iterator[Parameter]:
-    """Of all ramps together, those of both directions where there are two.
+    """Parameters of all ramps together; of both directions if there are two.
 
-    curve_of: the curve of bristles of a ramp that slides at a torque (N m).
+    curve_of: the presliding curve of a ramp, by its breakaway torque (N m).
     """
     ramps = Ramps(
         tuple(item for each in groups for item in each.trials),
@@ -289,7 +286,7 @@ def parameters_of(
 def _weaker_shares(
     ramps: Ramps, curve_of: Callable[[TrialData, float], Presliding], notes: list[str]
 ) -> Iterator[float]:
-    """Share of the torque that each ramp's weaker interfaces carry: 0 where it shows only one."""
+    """Share of the torque on the weaker interfaces of each ramp; 0 if it shows only one."""
     for item, own in zip(ramps.trials, ramps.found, strict=True):
         if OF_RAMPS[STRONGEST] not in own:
             continue

@@ -14,18 +14,18 @@ from campaign.experiments.interface import bench_of
 from campaign.units import angle_text, in_words, rate_text, torque_text
 
 FEW_COUNTS = 10.0
-"""of the encoder in presliding: an angle of fewer shows no curve."""
+"""Smallest number of encoder counts in presliding that shows a curve."""
 SHORT_REST = 0.2
-"""Standstill over the ramp's length below which the gyro's bias widens the interval of sigma0; with
-a third of the ramp's length it hardly does."""
+"""Rest over ramp length, below which the gyro's bias widens the interval of sigma0; at a third of
+the ramp length it hardly does."""
 LONG_REST = 0.3
-"""Share of a period's length that a rest has at least, as advice."""
+"""Advised rest over ramp length, at least."""
 WIDE = 0.05
-"""Half-width over value from which a longer standstill is worth its time."""
+"""Half-width over value, above which a longer rest is advised."""
 
 
 def remarks(ramps: Ramps) -> Iterator[str]:
-    """Sentences; those that ask for something name the option."""
+    """Sentences on the ramps; advice names the option to change."""
     for item, own in zip(ramps.trials, ramps.found, strict=True):
         if "bristle_stiffness" not in own:
             yield (
@@ -47,10 +47,10 @@ def remarks(ramps: Ramps) -> Iterator[str]:
 
 
 def _inertia(ramps: Ramps) -> Iterator[str]:
-    found = [abs(each.value) for each in ramps.values("peak_acceleration")]
+    accelerations = [abs(each.value) for each in ramps.values("peak_acceleration")]
     inertia = bench_of(ramps.trials[0].trial).axis.inertia
-    if found and inertia is not None:
-        moved = torque_text(0.01 * float(np.mean(found)) * inertia, ".2g")
+    if accelerations and inertia is not None:
+        moved = torque_text(0.01 * float(np.mean(accelerations)) * inertia, ".2g")
         yield f"An error of 1 % of the inertia moves the breakaway torque by {moved}."
 
 
@@ -67,10 +67,10 @@ def _encoder(ramps: Ramps) -> Iterator[str]:
 
 
 def _rest(ramps: Ramps) -> Iterator[str]:
-    found = ramps.values("bristle_stiffness")
+    stiffness = ramps.values("bristle_stiffness")
     rest, rate = option_of(ramps, "rest"), option_of(ramps, "torque_rate")
     torques = [each.value for each in ramps.values("breakaway_torque")]
-    wide = [each for each in found if _relative(each) > WIDE]
+    wide = [each for each in stiffness if _relative(each) > WIDE]
     if not torques or not wide:
         return
     length = float(np.mean(torques)) / rate
@@ -101,14 +101,14 @@ def _rate(ramps: Ramps) -> Iterator[str]:
 
 
 def _hidden(ramps: Ramps) -> Iterator[str]:
-    found = [own for own in ramps.found if "stiffness_at_rest" in own]
-    bounds = sum(own["stiffness_at_rest"].reason in NOT_RESOLVED for own in found)
-    above = sum(own["bristle_stiffness"].reason in NOT_RESOLVED for own in found)
+    fitted = [own for own in ramps.found if "stiffness_at_rest" in own]
+    bounds = sum(own["stiffness_at_rest"].reason in NOT_RESOLVED for own in fitted)
+    above = sum(own["bristle_stiffness"].reason in NOT_RESOLVED for own in fitted)
     if not (bounds or above):
         return
     rate = option_of(ramps, "torque_rate")
     yield (
-        f"The gyro's noise may hide a stiffer interface that slips first. Of {len(found)} ramps, "
+        f"The gyro's noise may hide a stiffer interface that slips first. Of {len(fitted)} ramps, "
         f"stiffness at rest is a lower bound in {bounds} and σ0 an upper bound in {above}. A "
         f"torque_rate of {in_words(4.0 * rate, 'N m/s', form='.2g')} shows twice as much above "
         "the noise."
@@ -132,13 +132,13 @@ def _relative(estimate: Estimate) -> float:
 
 
 def _by_window(estimate: Estimate) -> float:
-    """Systematic part of where the fitted window ends (1 sigma)."""
+    """Systematic part of the end of the fitted window (1 sigma)."""
     parts = (part for part in estimate.systematic if part.source == WINDOW)
     return sum(part.standard_uncertainty or 0.0 for part in parts)
 
 
 def _scatter(estimate: Estimate) -> float:
-    """Half of the interval without the systematic parts; 0 where there is none."""
+    """Half-width of the interval without systematic parts; 0 without an interval."""
     if estimate.low is None or estimate.high is None:
         return 0.0
     return 0.5 * (estimate.high - estimate.low)

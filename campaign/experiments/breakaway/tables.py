@@ -19,26 +19,26 @@ EXTREME = Cause(
     "the extreme of the ramps; each has its own interval in the table above",
 )
 SHARE = "bristle_stiffness_to_"
-"""What the metric of a window is called, before its share of the breakaway torque."""
+"""Prefix of the metric of a window, before its share of the breakaway torque."""
 
 
 def findings_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]]) -> Iterator[Finding]:
-    """One for each quantity of each ramp; their means, which name a direction where there are two.
+    """Findings for each quantity of each ramp, then the means by direction.
 
-    That of both directions is their nominal value.
+    The nominal value is the mean of both directions.
     """
     for place, own in zip(ramps.places, ramps.found, strict=True):
         for quantity in QUANTITIES:
             if quantity in own:
                 yield _finding(own[quantity], place)
     shared = {k: v for k, v in ramps.places[0].items() if k not in ("measurement", "position")}
-    for direction, found in means.items():
-        for estimate in found.values():
+    for direction, estimates in means.items():
+        for estimate in estimates.values():
             yield _finding(estimate, {**shared, "direction": direction, "statistic": "mean"})
 
 
 def _finding(estimate: Estimate, place: Mapping[str, Cell]) -> Finding:
-    # sigma1 is a formula of sigma0 and of assumed numbers: no ramp measures it.
+    # sigma1 is computed from sigma0 and assumed numbers: no ramp measures it.
     conditions = {name: value for name, value in place.items() if not isinstance(value, Estimate)}
     return Finding.of(estimate, conditions, recomputed=estimate.name == "bristle_damping")
 
@@ -59,13 +59,13 @@ def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: 
         }
         for place, own in zip(ramps.places, ramps.found, strict=True)
     ]
-    for direction, found in means.items():
+    for direction, estimates in means.items():
         chords = [each.value for each in ramps.values("chord", direction)]
         rows.append(
             {
                 "measurement": "mean",
                 "direction": direction,
-                **found,
+                **estimates,
                 "chord": _chord(float(np.mean(chords))) if chords else None,
             }
         )
@@ -92,17 +92,17 @@ def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: 
 
 
 def window_table(ramps: Ramps, suffix: str) -> Iterator[Table]:
-    """How much it matters where the fit ends; nothing where no ramp has a curve."""
+    """Dependence of sigma0 on the end of the fitted window; no table if no ramp has a curve."""
     names = dict.fromkeys(name for own in ramps.found for name in own if name.startswith(SHARE))
     shares = {float(name.removeprefix(SHARE)): name for name in names}
     rows: list[dict[str, Cell]] = []
     for share in sorted(shares):
-        found = ramps.values(shares[share])
-        values = np.array([each.value for each in found])
+        stiffness = ramps.values(shares[share])
+        values = np.array([each.value for each in stiffness])
         rows.append(
             {
                 "share": share,
-                "mean": mean("bristle_stiffness", found),
+                "mean": mean("bristle_stiffness", stiffness),
                 "lowest": float(values.min()),
                 "highest": float(values.max()),
             }

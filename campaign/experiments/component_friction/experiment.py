@@ -1,9 +1,9 @@
 """Breakaway torque of each component on its own: motor, gearbox, load (section 4.2.1, Table 4.1).
 
-The component is demounted and turned by hand through a torque sensor, to one side and to the other
-in turn. On a simulated bench that is a slow torque ramp with every other friction taken away. What
-is motor-side is measured at the motor shaft, so one count of the sensor counts as many times at the
-load as the gear reduces.
+The component is removed and turned by hand through a torque sensor, in alternating directions. A
+simulated bench applies a slow torque ramp, without the friction of other components. Motor-side
+components are measured at the motor shaft: the gear ratio multiplies a count of the sensor at the
+load.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularRate, Frequency, Time, Torque, TorqueRate, torque_text
 
 REACH = 2.0
-"""The ramp ends at this many times the friction that the bench describes."""
+"""End of the ramp, in multiples of the friction of the bench."""
 OWN = ("component", "measurement")
 STILL_ROSE = Cause("friction that still rose", "friction still rose at the end of some readings")
 
@@ -98,12 +98,12 @@ def _trials(options: ComponentFrictionOptions, bench: Bench) -> Iterator[TrialRe
         tree: Tree = alone.model_dump(mode="json")
         stop = options.rest + peak / options.torque_rate
         for number in range(1, options.measurements + 1):
-            way = _way(options.direction, number)
+            sign = _way(options.direction, number)
             yield TrialRequest(
                 Task(
                     mode="torque",
                     command=Polyline(
-                        times=(0.0, options.rest, stop), values=(0.0, 0.0, way * float(peak))
+                        times=(0.0, options.rest, stop), values=(0.0, 0.0, sign * float(peak))
                     ),
                     duration=stop,
                     window=(options.rest, stop),
@@ -142,7 +142,7 @@ def _alone(bench: Bench, component: str, scatter: float | None) -> Bench:
 
 @dataclass(frozen=True)
 class Reading:
-    """One measurement: what the torque sensor shows of it, seen at the load."""
+    """One measurement: reading of the torque sensor, referred to the load."""
 
     data: TrialData
     place: dict[str, Value]
@@ -156,17 +156,17 @@ def _options(data: TrialData) -> ComponentFrictionOptions:
 
 
 def _count(data: TrialData, component: str) -> float:
-    """One count of the torque sensor, seen at the load (N m)."""
+    """One count of the torque sensor, referred to the load (N m)."""
     options = _options(data)
     bench = bench_of(data.trial)
     return options.sensor_resolution * bench.at_load(bench.friction[component])[0]
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """The reading: the largest friction of the ramp, rounded to a count of the torque sensor."""
+    """Reading: largest friction of the ramp, rounded to a count of the torque sensor."""
     options = _options(data)
     recording = data.recording()
-    found = breakaway_torque(
+    torque = breakaway_torque(
         recording.time,
         recording[GYRO_RATE],
         recording[DRIVE_TORQUE],
@@ -175,10 +175,10 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     ).torque
     count = _count(data, str(data.trial.point["component"]))
     if count == 0:
-        return (found,)
-    shift = round(found.value / count) * count - found.value
-    low, high = (None if end is None else end + shift for end in (found.low, found.high))
-    shown = replace(found, value=found.value + shift, low=low, high=high)
+        return (torque,)
+    shift = round(torque.value / count) * count - torque.value
+    low, high = (None if end is None else end + shift for end in (torque.low, torque.high))
+    shown = replace(torque, value=torque.value + shift, low=low, high=high)
     return (shifted_by(shown, RESOLUTION, count / math.sqrt(12.0)),)
 
 
@@ -213,12 +213,12 @@ def _by_component(readings: list[Reading]) -> dict[str, list[Reading]]:
 
 
 def _open_ended(estimate: Estimate) -> Estimate:
-    """Without an interval, because friction still rose."""
+    """Estimate without interval, because friction still rose."""
     return replace(estimate, low=None, high=None, standard_error=None, reason=STILL_ROSE())
 
 
 def _statistics(readings: list[Reading]) -> dict[str, Estimate]:
-    """Mean and standard deviation (N m); the latter of these very readings."""
+    """Mean and standard deviation (N m), the latter of these readings only."""
     torques = [reading.torque.value for reading in readings]
     count = _count(readings[0].data, readings[0].component)
     mean = mean_of_readings("breakaway_torque", torques, "N m", count)
@@ -279,8 +279,8 @@ def _table(readings: list[Reading], suffix: str) -> Table:
         rows.append(row)
     statistics = {name: _statistics(own) for name, own in components.items()}
     for statistic in ("mean", "standard deviation"):
-        told: dict[str, Cell] = {name: values[statistic] for name, values in statistics.items()}
-        rows.append({"measurement": statistic, **told})
+        cells: dict[str, Cell] = {name: values[statistic] for name, values in statistics.items()}
+        rows.append({"measurement": statistic, **cells})
     if len(components) > 1:
         rows[-2]["sum"] = total_of({name: values["mean"] for name, values in statistics.items()})
     return Table(
@@ -338,7 +338,7 @@ def total_of(means: Mapping[str, Estimate]) -> Estimate:
 
 
 def load_share(means: Mapping[str, Estimate], sides: Mapping[str, str]) -> Estimate:
-    """Share of the load in that sum; `sides` says on which side of the gear each component is."""
+    """Share of the load in that sum; `sides`: side of the gear of each component."""
     total = sum(mean.value for mean in means.values())
     load = sum(mean.value for name, mean in means.items() if sides[name] == "load")
     parts = [

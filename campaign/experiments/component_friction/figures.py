@@ -15,15 +15,15 @@ from campaign.experiments.shared.captions import amount, listed, sentence
 from campaign.result import Axis, Curve, Figure, Mark, Panel, Value
 
 NUMBERS = 10
-"""Most measurements whose number stands at the axis."""
+"""Most numbers of measurements at the axis."""
 BEHIND = 1.5
-"""How far the mean stands behind the last measurement."""
+"""Distance of the mean from the last measurement on the axis."""
 TORQUE = "breakaway_torque"
 
 
 @dataclass(frozen=True)
 class ComponentCurves:
-    """What is shown of one component.
+    """Curves of one component.
 
     Attributes:
         numbers: of the measurements.
@@ -90,14 +90,14 @@ def component_figure(
 
 
 def _ramp(each: ComponentCurves) -> Curve:
-    """Size of rate over size of torque."""
+    """Absolute rate over absolute torque of the first measurement."""
     recording = each.ramp.recording()
     torque, rate = np.abs(recording[DRIVE_TORQUE]), np.abs(recording[GYRO_RATE])
     return Curve(torque, rate, each.name, each.name, "thin")
 
 
 def _dots(each: ComponentCurves, place: Mapping[str, Value], behind: float) -> tuple[Curve, Curve]:
-    """The readings by their numbers, and their mean behind them."""
+    """Curves of the readings by their numbers, and of their mean after them."""
     own = {**place, "component": each.name}
     curve = partial(Curve.of, label=each.name, series=each.name, quantity=TORQUE)
     return (
@@ -107,20 +107,20 @@ def _dots(each: ComponentCurves, place: Mapping[str, Value], behind: float) -> t
 
 
 def _numbered(count: int) -> Axis:
-    """The measurements by number, as many as there is room for, and their mean behind them."""
+    """Axis of the measurements with at most `NUMBERS` numbers, and their mean after them."""
     step = -(-count // NUMBERS)
     names = ((float(number), str(number)) for number in range(1, count + 1, step))
     return Axis("Measurement", places=(*names, (count + BEHIND, "mean")))
 
 
 def _what_shows(shown: Sequence[ComponentCurves]) -> str:
-    """Means of the components, the largest first, and on which steps readings fall."""
+    """Caption text: means of the components, the largest first, and steps of the readings."""
     order = sorted(shown, key=lambda each: -each.mean.value)
     words = [f"{each.name} {amount(each.mean.value, 'N m')}" for each in order]
-    told = sentence(f"on average {listed(words)}")
+    means = sentence(f"on average {listed(words)}")
     behind = [each for each in shown if each.count > 0]
     if not behind:
-        return told
+        return means
     step, names = amount(behind[0].count, "N m"), listed([each.name for each in behind])
     steps = f"One count of the sensor is {step} behind the gear"
-    return f"{told} {steps}: readings of {names} are multiples of it."
+    return f"{means} {steps}: readings of {names} are multiples of it."

@@ -22,12 +22,12 @@ from campaign.trial import Trial
 
 
 def options_of(trial: Trial) -> ExcitationOptions:
-    """Of a trial, as it was planned."""
+    """Options of a trial, as planned."""
     return ExcitationOptions.model_validate(trial.options, context={"si": True})
 
 
 def measured_part(trial: Trial, recording: Recording) -> slice:
-    """The samples that are measured: whole periods from the end, or all of them."""
+    """The measured samples: whole periods before the end for a multisine, else all."""
     options, rate = options_of(trial), trial.task.sample_rate
     count = len(recording.time)
     if options.signal != "multisine":
@@ -36,7 +36,7 @@ def measured_part(trial: Trial, recording: Recording) -> slice:
 
 
 def metrics_of(data: TrialData) -> Iterator[Estimate]:
-    """What was commanded and what came of it, of one trial."""
+    """Numbers of the command and the reached motion of one trial."""
     trial, recording = data.trial, data.recording()
     cut = measured_part(trial, recording)
     unit = "N m" if trial.task.mode == "torque" else "rad/s"
@@ -68,7 +68,7 @@ def _rms(samples: Array) -> float:
 
 
 def reached_rate(data: TrialData) -> tuple[Array, Array]:
-    """Times and rate of the part that is measured, each (n,); of a series as its angle has it."""
+    """Times and rate of the measured part, each (n,); for a series the rate from its angle."""
     if options_of(data.trial).signal == "fourier":
         motion = motion_of(data)
         return motion.time, motion.rate
@@ -78,18 +78,18 @@ def reached_rate(data: TrialData) -> tuple[Array, Array]:
 
 
 def motion_of(data: TrialData) -> Motion:
-    """How a series moved: its longest part without a lost sample. Raises ValueError for none."""
+    """Longest part of a series without a lost sample. Raises ValueError for none."""
     pieces = moved((data,), FilterSettings.for_rate(data.trial.task.sample_rate))
     return max((each.motion for each in pieces), key=lambda motion: len(motion.time))
 
 
 Account = tuple[TrialData, Mapping[str, Estimate]]
 USED = (("top_angle", "angle"), ("top_rate", "rate"), ("peak_torque", "torque"))
-"""Metrics, and the limits that they are held against."""
+"""Metrics, and the limits to which they are compared."""
 
 
 def reached_tables(accounts: Sequence[Account]) -> Iterator[Table]:
-    """What was asked beside what was reached, trial by trial; one table for each mode."""
+    """Requested and reached numbers of each trial; one table for each mode."""
     modes = dict.fromkeys(data.trial.task.mode for data, _ in accounts)
     for mode in modes:
         own = [each for each in accounts if each[0].trial.task.mode == mode]

@@ -1,7 +1,7 @@
 """Commands from the options of an excitation.
 
-Of what the line to a controller has a word for, a command is that word: sums of sines. All else is
-a polyline, of as few points as its course needs; a controller says how many it takes.
+Sums of sines remain sums of sines, for which the line to a controller has a message. All else is a
+polyline with as few points as its course needs; the controller limits their number.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from campaign.signals import Array, MultiSine, Polyline
 from campaign.units import angle_text, rate_text, torque_text
 
 PER_CYCLE = 16.0
-"""Points of a polyline of noise per cycle of its highest frequency, at least."""
+"""Smallest number of points per cycle of the highest frequency of noise."""
 MOST_POINTS = 100_000
-"""of a polyline: a trial carries all of them."""
+"""Largest number of points of a polyline: a trial contains all of them."""
 NYQUIST_SHARE = 0.4
-"""of the controller's sample rate: the highest frequency that can be told."""
+"""of the controller's sample rate: the highest frequency that can be commanded."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """One command, whole: what is measured of it begins at `begin` (s), and ends with it."""
+    """One complete command; its measured part is from `begin` (s) to its end."""
 
     command: MultiSine | Polyline
     begin: float
@@ -51,7 +51,7 @@ class Course:
 
 
 def courses(options: ExcitationOptions, bench: Bench) -> Iterator[Course]:
-    """The commands of a test. Raises ValueError, with a message for the user, where none is."""
+    """The commands of a test. Raises ValueError, with a message for the user, if there is none."""
     if options.signal not in ("fourier", "file"):
         _check_band(options, bench)
     match options.signal:
@@ -89,7 +89,7 @@ def _check_band(options: ExcitationOptions, bench: Bench) -> None:
 
 
 def grid_of(options: ExcitationOptions) -> OddGrid:
-    """Lines of a multisine, the same in all of its realisations. Raises ValueError for none."""
+    """Lines of a multisine, common to its realizations. Raises ValueError for none, or too many."""
     grid = odd_grid(options.lowest, options.highest, options.period, options.seed, options.group)
     if len(grid.excited) > MOST_LINES:
         raise ValueError(
@@ -99,7 +99,7 @@ def grid_of(options: ExcitationOptions) -> OddGrid:
     return grid
 
 
-@lru_cache(maxsize=64)  # a sweep of the amplitude asks for the same ones again
+@lru_cache(maxsize=64)  # a sweep of the amplitude repeats the same calls
 def _unscaled(
     lowest: float, highest: float, period: float, group: int, draws: int, lowered: bool,
     order: int, seed: int, count: int,
@@ -112,7 +112,7 @@ def _unscaled(
 
 
 def _derived(seed: int, number: int) -> int:
-    """A seed of its own for each realisation."""
+    """A separate seed for each realization."""
     return int(np.random.SeedSequence((seed, number)).generate_state(1)[0])
 
 
@@ -128,10 +128,10 @@ def _multisines(options: ExcitationOptions) -> Iterator[Course]:
         options.lowest, options.highest, options.period, options.group, options.draws,
         options.phases == "lowered", _order(options), options.seed, options.realisations,
     )  # fmt: skip
-    # All have the same power, as one response is made of them; the largest value is that of one.
+    # All have the same power, since one response is made of them; one of them has the peak.
     scale = options.size / max(peak(each, options.period) for each in signals)
     for number, signal in enumerate(signals, start=1):
-        told = (
+        note = (
             f"{lines} odd lines from {signal.frequencies[0]:.4g} to {signal.frequencies[-1]:.4g} "
             f"Hz, crest factor {crest_factor(signal, options.period):.3g}"
         )
@@ -139,11 +139,11 @@ def _multisines(options: ExcitationOptions) -> Iterator[Course]:
             update={"amplitudes": tuple(scale * a for a in signal.amplitudes)}
         )
         duration = options.settle + options.periods * options.period
-        yield Course(sized, options.settle, duration, told, number)
+        yield Course(sized, options.settle, duration, note, number)
 
 
 def _order(options: ExcitationOptions) -> int:
-    """Which integral of a command begins at zero: a rate itself, or what a torque makes of it."""
+    """Order of the integral that begins at zero: 0 for a rate, 1 for a torque."""
     return 1 if options.command == "torque" else 0
 
 
@@ -151,7 +151,7 @@ def _chirp(options: ExcitationOptions) -> Course:
     sweep = chirp(options.lowest, options.highest, options.duration, options.sweep)
     time = sweep.points()
     _check_points(len(time), "lower highest, or shorten duration")
-    # A torque begins at its peak, and a free load then neither creeps nor drifts.
+    # A torque begins at its peak, so that a free load neither creeps nor drifts.
     values = options.size * np.sin(sweep.phase(time) + 0.5 * np.pi * _order(options))
     note = f"{options.sweep} sweep from {options.lowest:.4g} to {options.highest:.4g} Hz"
     return Course(_polyline(time, values), 0.0, float(time[-1]), note)
@@ -190,7 +190,7 @@ def _polyline(time: Array, values: Array) -> Polyline:
 
 
 def series_of(options: ExcitationOptions, bench: Bench) -> FourierSeries:
-    """The series that a search finds within the limits. Raises ValueError for no room."""
+    """The best series of a search within the limits. Raises ValueError for no room."""
     room = room_of(options, bench)
     return best_series(
         options.period, options.harmonics, options.terms, room, options.position, options.search,
@@ -199,9 +199,9 @@ def series_of(options: ExcitationOptions, bench: Bench) -> FourierSeries:
 
 
 def room_of(options: ExcitationOptions, bench: Bench) -> Room:
-    """What the test's own limits, or else the bench's, leave a series.
+    """Limits of a series, from the test's own limits or else from the bench's.
 
-    What friction takes of the torque counts at the largest rate. Raises ValueError for no room.
+    Friction at the largest rate reduces the torque. Raises ValueError for no room.
     """
     rig = Rig(bench)
     rate = options.max_rate or MOST * rig.limits.rate
@@ -218,10 +218,10 @@ def room_of(options: ExcitationOptions, bench: Bench) -> Room:
 
 
 def start_of(options: ExcitationOptions, bench: Bench, course: Course) -> float:
-    """Where the load begins (rad), so that it swings around the position.
+    """Start angle (rad) of the load, so that it swings around the position.
 
-    Of a torque as if nothing rubbed, where nobody says how heavy the load is: at the position.
-    Raises ValueError for a torque that would swing a load without friction beyond the limits.
+    For a torque, friction is neglected; without an inertia, or below static friction, the start is
+    the position. Raises ValueError if a frictionless load would swing beyond the limits.
     """
     if options.command == "rate":
         return options.position - _middle(_travel(course, 1)[1])
@@ -251,14 +251,14 @@ def _middle(course: Array) -> float:
 
 
 def _travel(course: Course, order: int) -> tuple[Array, Array]:
-    """The last two integrals, from zero, of a command that is integrated so many times."""
+    """The last two integrals, from zero, of a command integrated `order` times."""
     time = _fine(course)
     command = course.command
     if isinstance(command, MultiSine):
-        found = [command.integral(time, n) for n in range(order + 1)]
+        integrals = [command.integral(time, n) for n in range(order + 1)]
         for n in range(1, order + 1):
-            found[n] = found[n] - found[n][0]
-        return found[-2], found[-1]
+            integrals[n] = integrals[n] - integrals[n][0]
+        return integrals[-2], integrals[-1]
     values = [command.sample(time)]
     for _ in range(order):
         steps = 0.5 * np.diff(time) * (values[-1][1:] + values[-1][:-1])

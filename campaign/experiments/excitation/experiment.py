@@ -1,8 +1,8 @@
 """Excitation: a motion or torque designed for identification.
 
-Odd random-phase multisines show the response with its noise and distortion, a Fourier series
-searched for the lowest condition number shows inertia and friction; chirps, noise and a file of
-one's own are for whatever else is to be identified (`campaign identify`).
+Odd random-phase multisines give the response with its noise and distortion. A Fourier series with
+the lowest condition number of a search gives inertia and friction. Chirps, noise and user files
+serve other identifications (`campaign identify`).
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ from campaign.result import Finding, Result, Value
 from campaign.trial import Task, TrialRequest
 
 OWN = ("realisation",)
-"""What distinguishes the trials of one group."""
+"""Conditions in which the trials of one group differ."""
 STEADY = "steady"
-"""The window that is measured."""
+"""The measured window."""
 READING = Reading("auto", "H1", None, None)
 Place = Mapping[str, Value]
 SWING = 0.7
-"""of the angle limit that a command of a rate may use up by the experiment's own choice."""
+"""Share of the angle limit that the default options of a rate command may use."""
 FAVARD = 0.5 * math.pi
-"""An integral of zero mean is at most so much larger than its derivative over the lowest omega."""
+"""Largest ratio of an integral of zero mean to its derivative over the lowest omega."""
 
 
 def _trials(options: ExcitationOptions, bench: Bench) -> Iterator[TrialRequest]:
@@ -89,7 +89,7 @@ def _fit(options: ExcitationOptions, bench: Bench) -> Mapping[str, ChosenValue]:
     room = SWING * (rig.limits.angle - abs(options.position))
     if room <= 0:
         raise ValueError(NO_ROOM)
-    # A signal of that band accelerates no more than a sine of its size at the highest frequency.
+    # A signal of that band accelerates at most as a sine of its size at the highest frequency.
     reasons = {
         "a usual size": usual(20),
         share("rate", 0.5): 0.5 * rig.limits.rate,
@@ -104,7 +104,7 @@ def _fit(options: ExcitationOptions, bench: Bench) -> Mapping[str, ChosenValue]:
 
 
 def _low_enough(choices: Choices, rig: Rig, torque: float) -> None:
-    """Raise the lowest frequency until a load without friction keeps within the limits."""
+    """Raise the lowest frequency until a frictionless load stays within the limits."""
     if rig.bench.axis.inertia is None:
         return
     free, limits = torque / rig.bench.axis.inertia, rig.limits
@@ -132,7 +132,7 @@ def _warnings(options: ExcitationOptions, bench: Bench) -> Iterable[str]:
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """What was commanded, and the largest of what came of it."""
+    """Numbers of the command and of the reached motion."""
     return tuple(metrics_of(data))
 
 
@@ -143,25 +143,25 @@ def _analyse(data: TestData) -> Result:
         known, OWN, lambda group, suffix: Result(figures=(command_figure(group, suffix),))
     )
     shaken = [each for each in known if options_of(each.trial).signal != "fourier"]
-    found = joined((_responses(shaken), of_each_place(known, OWN, partial(_of_series, data))))
-    whole = joined((Result(tuple(reached_tables(accounts))), commands, found))
-    return replace(whole, telling=next((figure.key for figure in found.figures), ""))
+    results = joined((_responses(shaken), of_each_place(known, OWN, partial(_of_series, data))))
+    whole = joined((Result(tuple(reached_tables(accounts))), commands, results))
+    return replace(whole, telling=next((figure.key for figure in results.figures), ""))
 
 
 def _responses(trials: Sequence[TrialData]) -> Result:
-    """Of all that shakes, as `campaign identify` has them without options."""
+    """Frequency responses of all trials but series, as of `campaign identify` without options."""
     if not trials:
         return Result()
     own, why = usable(trials)
     if not own:
         return Result(notes=(f"{why}.",))
-    found, remarks = sources(own, bench_of(own[0].trial), READING)
-    if not found:
+    responses, remarks = sources(own, bench_of(own[0].trial), READING)
+    if not responses:
         return Result(notes=tuple(remarks))
-    found.sort(key=lambda each: each.trials)
+    responses.sort(key=lambda each: each.trials)
     by_number = {each.trial.number: conditions(each) for each in own}
     findings: list[Finding] = []
-    for source in found:
+    for source in responses:
         first, *others = (by_number[number] for number in source.trials)
         place = {
             name: value
@@ -171,33 +171,33 @@ def _responses(trials: Sequence[TrialData]) -> Result:
         findings += [Finding.of(each, place) for each in distortion_of(source)]
         remarks += source.remarks
     return Result(
-        (sources_table(found), *distortion_tables(found)),
-        (*response_figures(found), coherence_figure(found)),
+        (sources_table(responses), *distortion_tables(responses)),
+        (*response_figures(responses), coherence_figure(responses)),
         tuple(findings),
         tuple(remarks),
     )
 
 
 def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
-    """Inverse dynamics of one place of the sweep, with the terms that the series is made for."""
+    """Inverse dynamics of one sweep point, with the terms for which the series is designed."""
     options = options_of(group[0].trial)
     if options.signal != "fourier":
         return Result()
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
-    asked = InverseDynamicsOptions(terms=options.terms)
+    own = InverseDynamicsOptions(terms=options.terms)
     try:
-        found = identify(replace(data, trials=tuple(group)), asked)
+        inverse = identify(replace(data, trials=tuple(group)), own)
     except ValueError as error:
         return Result(notes=(f"{group[0].trial.label}: {error}.",))
-    findings = tuple(replace(each, conditions=place) for each in found.findings)
+    findings = tuple(replace(each, conditions=place) for each in inverse.findings)
     return Result(
-        tuple(replace(each, key=f"{each.key}{suffix}") for each in found.tables),
+        tuple(replace(each, key=f"{each.key}{suffix}") for each in inverse.tables),
         (
-            *(replace(each, key=f"{each.key}{suffix}") for each in found.figures),
+            *(replace(each, key=f"{each.key}{suffix}") for each in inverse.figures),
             plane_figure(group, suffix),
         ),
         findings,
-        found.notes,
+        inverse.notes,
     )
 
 

@@ -22,17 +22,17 @@ from campaign.signals import MultiSine
 
 TIME = Axis("Time", "s", "s")
 SHOWN = 20.0
-"""s of a course that are drawn, at most."""
+"""s; longest drawn part of a course."""
 CYCLES = 40.0
-"""of the highest frequency of a sum of sines that are drawn, at most: more are a black band."""
+"""Largest number of drawn cycles of the highest frequency: more are a black band."""
 SEGMENTS = 16
-"""that a course without a period is cut into for its spectrum."""
+"""of a course without a period, for its spectrum."""
 FLOOR = -80.0
-"""dB: what lies below is not drawn."""
+"""dB; lower levels are not drawn."""
 
 
 def command_figure(group: Sequence[TrialData], suffix: str) -> Figure:
-    """Course and spectrum of the command of the first trial, and of what came of it."""
+    """Course and spectrum of the command of the first trial, and of the reached motion."""
     data = group[0]
     trial, recording = data.trial, data.recording()
     options, command = options_of(trial), trial.task.command
@@ -41,27 +41,27 @@ def command_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     if in_torque:
         reached = recording[DRIVE_TORQUE][measured_part(trial, recording)]
     axis = Axis("Torque", "N m", "N m") if in_torque else Axis("Rate", "rad/s", "deg/s")
-    asked = command.sample(time)
-    length, told = SHOWN, f"up to {setting(SHOWN, 's')} of it"
+    setpoint = command.sample(time)
+    length, part = SHOWN, f"up to {setting(SHOWN, 's')} of it"
     if isinstance(command, MultiSine):
-        length, told = options.period, "one period"
+        length, part = options.period, "one period"
         if CYCLES / max(command.frequencies) < length:
-            length, told = CYCLES / max(command.frequencies), "the beginning of a period"
+            length, part = CYCLES / max(command.frequencies), "the beginning of a period"
     shown = time - time[0] <= length
     course = [
-        Curve(time[shown], asked[shown], "asked", "reference"),
+        Curve(time[shown], setpoint[shown], "asked", "reference"),
         Curve(time[shown], reached[shown], "reached", "measured", "thin"),
     ]
     several = " Of several trials the first is drawn." if len(group) > 1 else ""
     return Figure(
         key=f"command{suffix}",
         title="Command and response",
-        caption=f"Left, {told}; right, where in frequency the command has its power, and what came "
+        caption=f"Left, {part}; right, where in frequency the command has its power, and what came "
         f"of it there, both over the largest of the command.{several}",
         alt="Command and measured course over time, and the levels of both over frequency.",
         panels=(
             Panel(TIME, axis, course),
-            _spectrum(command, asked, reached, 1.0 / (time[1] - time[0])),
+            _spectrum(command, setpoint, reached, 1.0 / (time[1] - time[0])),
         ),
         across=2,
         trials=(trial.number,),
@@ -93,12 +93,12 @@ def _spectrum(command: object, asked: Array, reached: Array, rate: float) -> Pan
 
 
 def _filled(samples: Array) -> Array:
-    """Zeros where a sample was lost: this is drawn, and not reckoned with."""
+    """Samples with zeros for lost ones: for drawing only."""
     return np.asarray(np.nan_to_num(samples))
 
 
 def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
-    """Where in angle and rate a series goes, asked and reached."""
+    """Path of a series in angle and rate, requested and reached."""
     data = group[0]
     moved, task = motion_of(data), data.trial.task
     first = slice(round(options_of(data.trial).period * task.sample_rate) + 1)

@@ -42,7 +42,7 @@ class SignalTable(SeriesFile):
         return COMMANDS[name_of(self.value, COMMANDS, "a command")]
 
     def signal(self, command: str) -> Polyline:
-        """The command. Raises ValueError where it is one of another mode."""
+        """The command. Raises ValueError if its unit is of another mode."""
         quantity = self.quantity
         if (quantity is TORQUE) != (command == "torque"):
             raise ValueError(f"{self.value!r} is no unit of a {command}; write `command`, too")

@@ -1,7 +1,7 @@
 """Frequency response by stepped sine: closed or open loop, with each compensation (5.2.2, 5.3.4).
 
-One trial per frequency. A closed loop is driven by a sine of the rate command, an open one by a
-sine of the torque. The load starts where a swing around the middle begins, so that neither drifts.
+One trial per frequency. A sine of the rate command excites a closed loop, a sine of the torque an
+open one. The load starts where its swing around the middle begins, so that it does not drift.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ from campaign.units import (
 
 AT_HAND = Cause("describes the recording at hand", "it describes the recording at hand")
 NYQUIST_SHARE = 0.4
-"""of the controller's sample rate: the highest frequency that can be told."""
+"""Highest measurable frequency over the controller's sample rate."""
 MOST_FREQUENCIES = 10_000
-"""of a sweep."""
+"""Most frequencies of a sweep."""
 STEADY = "steady"
-"""The window of the whole cycles that are measured."""
+"""Window of the whole cycles that are measured."""
 
 
 class FrequencyResponseOptions(Options):
@@ -146,7 +146,7 @@ def _trials(options: FrequencyResponseOptions, bench: Bench) -> Iterator[TrialRe
 
 
 def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> TrialRequest:
-    """The trial at one frequency (Hz). Raises ValueError where the bench cannot do it."""
+    """Trial at one frequency (Hz). Raises ValueError if it is beyond the bench's limits."""
     rate = _sample_rate(options, bench, frequency)
     settle = max(options.settle_cycles, math.ceil(options.settle_time * frequency - 1e-9))
     start, stop = settle / frequency, (settle + options.cycles) / frequency
@@ -175,15 +175,15 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
 def _found(
     options: FrequencyResponseOptions, bench: Bench, offered: OfferedRecording
 ) -> Iterator[TrialRequest]:
-    """The sine that a recording of one frequency is."""
+    """Request of the sine in a recording of one frequency."""
     mode: Literal["rate", "torque"] = "rate" if options.loop == "closed" else "torque"
     times = options.settle_cycles, options.settle_time
     yield sine_response(offered, mode, _excitation(mode), STEADY, *times)
 
 
 def _refined_range(options: FrequencyResponseOptions, bench: Bench) -> tuple[float, float]:
-    """Lowest and highest frequency (Hz) of a refinement: those of the sweep, and a little beyond,
-    as far as the controller's sample rate shows them.
+    """Lowest and highest frequency (Hz) of a refinement: a little more than the sweep, as far as
+    the controller's sample rate shows them.
     """
     swept, control = swept_frequencies(options), control_rate(bench)
     highest = swept[-1] * (1.0 + PHASE_SHARE)
@@ -192,13 +192,13 @@ def _refined_range(options: FrequencyResponseOptions, bench: Bench) -> tuple[flo
 
 
 def _most_refined(options: FrequencyResponseOptions, bench: Bench) -> Most:
-    """What a refinement takes at most: all of it at the lowest frequency that it may have."""
+    """Upper limit of a refinement: all of its trials at its lowest frequency."""
     if not options.refine or options.loop != "closed":
         return NONE_MORE
     lowest, highest = _refined_range(options, bench)
     settle = max(float(options.settle_cycles), options.settle_time * highest + 1.0)
     longest = max(options.settle_cycles / lowest, options.settle_time + 1.0 / lowest)
-    # A whole share of the controller's rate is less than twice the rate that is asked for.
+    # A whole share of the controller's rate is less than twice the requested rate.
     samples = 2 * options.samples_per_cycle * math.ceil(settle + options.cycles)
     duration = longest + options.cycles / lowest
     return Most(MOST_REFINED, MOST_REFINED * duration, MOST_REFINED * samples)
@@ -207,10 +207,10 @@ def _most_refined(options: FrequencyResponseOptions, bench: Bench) -> Most:
 def _refined(
     options: FrequencyResponseOptions, bench: Bench, data: TestData
 ) -> Iterator[TrialRequest]:
-    """The frequencies that `refinement` finds in the sweep, as far as the bench can show them."""
+    """Requests at the frequencies of `refinement` in the sweep that the bench can show."""
     points = []
     for item in data.completed():
-        with suppress(ValueError):  # the analysis says so
+        with suppress(ValueError):  # the analysis reports it
             points.append(_point(item))
     if not points:
         return
@@ -222,12 +222,12 @@ def _refined(
 
 
 def _excitation(mode: str) -> str:
-    """The channel to which the gyro's rate is the response."""
+    """Channel of the excitation, to which the gyro's rate responds."""
     return COMMAND if mode == "rate" else DRIVE_TORQUE
 
 
 def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: float) -> float:
-    """Of the recording (Hz): `samples_per_cycle`, or a whole share of the controller's rate."""
+    """Sample rate (Hz) of `samples_per_cycle`, or a whole share of the controller's rate."""
     control = control_rate(bench)
     if control is None:
         return options.samples_per_cycle * frequency
@@ -240,13 +240,13 @@ def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: flo
 
 
 def _steady(trial: Trial) -> tuple[float, float]:
-    """The window that is measured (s): the one named so, or an older trial's only one."""
+    """Window that is measured (s): `STEADY`, or the only window of an older trial."""
     named = (window for window in trial.windows if window.name == STEADY)
     return next(((window.start, window.stop) for window in named), trial.task.window)
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """The response to one sine: its real and imaginary part, and the coherence."""
+    """Response to one sine: its real and imaginary part, and the coherence."""
     task = data.trial.task
     recording = data.recording().window(*_steady(data.trial))
     drive = recording[_excitation(task.mode)]
@@ -261,7 +261,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 
 COUNTS = 3.0
-"""of its sensor that a response has at least: a staircase of fewer is off by more than 3 %."""
+"""Least response in counts of its sensor: a staircase of fewer is off by more than 3 %."""
 TORQUE_TO_RATE = "rad/s/(N m)"
 
 
@@ -270,9 +270,9 @@ def _frequency(data: TrialData) -> float:
 
 
 def _point(data: TrialData) -> SinePoint:
-    """The sine of a trial, from its metrics. Raises ValueError where there is none."""
-    found = metrics(data, _measure)
-    real, imaginary = found["response_real"], found["response_imag"]
+    """Sine of a trial, from its metrics. Raises ValueError if there is none."""
+    values = metrics(data, _measure)
+    real, imaginary = values["response_real"], values["response_imag"]
     if not math.isfinite(real.value + imaginary.value):
         raise ValueError("its signals have no numbers")
     task, size = data.trial.task, abs(complex(real.value, imaginary.value))
@@ -284,7 +284,7 @@ def _point(data: TrialData) -> SinePoint:
         _frequency(data),
         complex(real.value, imaginary.value),
         real.standard_error or 0.0,
-        found["coherence"].value,
+        values["coherence"].value,
     )
 
 
@@ -318,11 +318,11 @@ def _analyse(data: TestData) -> Result:
         findings += changes(closed)
         notes += closed_notes(closed)
     if opened:
-        table, found, doubts = modes(opened, paths)
+        table, peaks, absent = modes(opened, paths)
         tables.append(table)
-        findings += found
-        notes += doubts
-        figures.append(torque_figure([(s.label, method(s), s.response) for s in opened], found))
+        findings += peaks
+        notes += absent
+        figures.append(torque_figure([(s.label, method(s), s.response) for s in opened], peaks))
     notes += quality_note(sweeps)
     return Result(tuple(tables), tuple(figures), tuple(findings), tuple(notes))
 
@@ -334,16 +334,16 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
     label = method_label(str(place["compensation"]))
     swept = {path: place.get(path) for path in paths if path != "compensation"}
     others = words(swept, first.trial, FrequencyResponseOptions)
-    found = characteristics(response) if loop == "closed" else None
-    return Sweep(place, loop, ", ".join([label, *others]), response, found)
+    servo = characteristics(response) if loop == "closed" else None
+    return Sweep(place, loop, ", ".join([label, *others]), response, servo)
 
 
 LIMIT_SHARE = 0.9
-"""of the bench's limits that the amplitude of a rate command may use."""
+"""Share of the bench's limits that a rate command's amplitude may use."""
 
 
 def amplitude_text(command: Sine, closed: bool) -> str:
-    """Of a rate command in a closed loop, or a torque in an open one; for people."""
+    """Amplitude of a rate command in a closed loop, or of a torque in an open one, in words."""
     if closed:
         return f"amplitude {rate_text(command.amplitude)}"
     return f"amplitude {torque_text(command.amplitude)}"
@@ -352,10 +352,10 @@ def amplitude_text(command: Sine, closed: bool) -> str:
 def rate_sine(
     bench: Bench, frequency: float, largest: float, acceleration: float | None
 ) -> tuple[Sine, float]:
-    """The rate command and half the angle it swings (rad); it starts at rest.
+    """Rate command and half its angle of swing (rad); it starts at rest.
 
-    Of amplitude `largest` (rad/s), or less where `acceleration` (rad/s^2) asks for it; None: as the
-    bench's limits do. Raises ValueError where these do not overcome its friction.
+    Its amplitude is `largest` (rad/s), or less for `acceleration` (rad/s^2); None: for the bench's
+    limits. Raises ValueError if these do not overcome the bench's friction.
     """
     rig, omega = Rig(bench), 2.0 * math.pi * frequency
     if acceleration is None:
@@ -370,10 +370,10 @@ def rate_sine(
 def torque_sine(
     bench: Bench, frequency: float, torque: float, position: float
 ) -> tuple[Sine, float]:
-    """The torque and half the angle (rad) that it would swing a load without friction.
+    """Torque and half the angle (rad) that a load without friction would swing.
 
-    Around `position` (rad), of amplitude `torque` (N m). It starts at its peak: the rate of a free
-    load then has no offset, and the angle no drift. Raises ValueError beyond the bench's limits.
+    Around `position` (rad), with amplitude `torque` (N m). It starts at its peak: a free load's
+    rate then has no offset, and its angle no drift. Raises ValueError beyond the bench's limits.
     """
     omega = 2.0 * math.pi * frequency
     limits = limits_of(bench)

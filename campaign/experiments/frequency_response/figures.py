@@ -15,14 +15,14 @@ from campaign.experiments.responses.figures import FREQUENCY, PHASE, gain_label,
 from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
 
 SHOWN_BEYOND = 1.2
-"""An extrapolated curve is drawn to this many times the crossover that it is for."""
+"""End of an extrapolated curve over the crossover that it is for."""
 
 NOTICEABLE = 0.02
-"""Half-width, as a share of the response, from which on a point's interval is drawn: 0.2 dB, 1°."""
+"""Half-width over the response above which a point's interval is drawn: 0.2 dB, 1°."""
 TWO_SIDED = 1.96
 """Half of a two-sided 95 % interval over its standard deviation."""
 BARE = "none"
-"""The series of a response without compensation."""
+"""Series of a response without compensation."""
 
 
 def closed_loop_figures(
@@ -32,7 +32,7 @@ def closed_loop_figures(
 ) -> Iterator[Figure]:
     """Figures 5.5 and 5.19 (closed loop), 5.6 and 5.20 (open loop from it).
 
-    names: short ones, of the sweeps, for the labels of their bandwidths and margins.
+    names: short names of the sweeps, for labels of their bandwidths and margins.
     """
     names = [series for _, series, _ in sweeps] if names is None else names
     several = len(sweeps) != len({series for _, series, _ in sweeps})
@@ -83,10 +83,10 @@ def closed_loop_figures(
 
 
 def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
-    """Figure 4.5: drive torque to gyro rate, and the inertia that it looks like."""
+    """Figure 4.5: drive torque to gyro rate, and the apparent inertia."""
     several = len(sweeps) != len({series for _, series, _ in sweeps})
     named = [(label, label if several else series, r) for label, series, r in sweeps]
-    found = [mode.value for mode in modes][:1]
+    resonances = [mode.value for mode in modes][:1]
     bode = _bode(
         "torque-to-rate",
         "Open-loop response, drive torque to gyro rate",
@@ -97,20 +97,20 @@ def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
         Axis(gain_label("Gain")),
         named,
         thesis=("4.5",),
-        level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
-        phase_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
+        level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in resonances),
+        phase_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in resonances),
     )
     inertia = Panel(
         FREQUENCY,
         Axis("Apparent inertia", "kg m^2", "kg m^2"),
         [Curve(r.frequency, _apparent_inertia(r), label, series) for label, series, r in named],
-        marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
+        marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in resonances),
     )
     return replace(bode, panels=(*bode.panels, inertia))
 
 
 def _apparent_inertia(response: Response) -> Array:
-    """Torque over acceleration (kg m^2), shape (n,): what a rigid free axis would have."""
+    """Torque over acceleration (kg m^2), shape (n,): the inertia of a rigid free axis."""
     omega = 2.0 * np.pi * response.frequency
     return np.asarray(1.0 / (omega * np.maximum(np.abs(response.values), 1e-300)))
 
@@ -123,15 +123,15 @@ def _chosen(*numbers: tuple[str, bool]) -> tuple[str, ...]:
 def _continued(
     loops: Sequence[Named], found: Sequence[ServoCharacteristics | None]
 ) -> Iterator[tuple[Curve, Curve]]:
-    """Gain and phase above the sweep, up to a crossover that lies there."""
+    """Extrapolated gain and phase from the sweep's end to a crossover above it."""
     label = "extrapolated"
     for (_, series, loop), read in zip(loops, found, strict=True):
         gain = read.crossing(read.gain_margin) if read else None
         phase = read.crossing(read.phase_margin) if read else None
         if gain is None or phase is None or not gain.extrapolated:
             continue
-        told = loop.told
-        beyond = Continuation.of(told, phase.frequency.value)
+        measured = loop.told
+        beyond = Continuation.of(measured, phase.frequency.value)
         if beyond is None:
             continue
         at = np.geomspace(beyond.start, SHOWN_BEYOND * gain.frequency.value, 60)
@@ -146,7 +146,7 @@ def _continued(
 def _with_interval(
     response: Response, values: Array, label: str, series: str, per_share: float
 ) -> Curve:
-    """A curve with its band where that is noticeable; `per_share` turns shares into its unit."""
+    """Curve with its band if the band is noticeable; `per_share` converts shares into its unit."""
     half = TWO_SIDED * response.relative_error
     if not np.any(half > NOTICEABLE):
         return Curve(response.frequency, values, label, series)
@@ -201,7 +201,7 @@ def _bode(
 
 
 def _range(frequency: Array) -> Axis:
-    """An axis over all frequencies (Hz), so that panels below each other have the same."""
+    """Axis over all frequencies (Hz), so that panels below each other have the same one."""
     known = frequency[np.isfinite(frequency)]
     if not known.size:
         return FREQUENCY
@@ -211,10 +211,10 @@ def _range(frequency: Array) -> Axis:
 def _differences(
     curves: Sequence[tuple[str, str, Response, Array, Array]],
 ) -> Iterator[Panel]:
-    """Gain and phase of each method less those without compensation, with their 95 % intervals.
+    """Gain and phase of each method minus those without compensation, with 95 % intervals.
 
-    Nothing where there is not one response without, or none to compare at the same frequencies:
-    curves that lie on one another do not show what compensation changes.
+    Requires exactly one response without compensation, and others at the same frequencies. Overlaid
+    curves do not show the effect of compensation.
     """
     bare = [each for each in curves if each[1] == BARE]
     if len(bare) != 1:

@@ -16,18 +16,18 @@ from campaign.experiments.shared.common import short_label
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, ends_of
 
 LABELLED = 4
-"""Most curves whose dots have a label; of more only the table has the numbers."""
+"""Most curves whose dots have a label; with more, only the table has the numbers."""
 SIDE_BY_SIDE = 8
-"""Most sweeps that have room beside each other."""
+"""Most sweeps beside each other."""
 TURN = 2.0 * np.pi
-"""rad"""
+"""One turn (rad)."""
 PLOTTED = -3.0
-"""dB: the level of the bandwidth."""
+"""Level of the bandwidth (dB)."""
 
 
 @dataclass(frozen=True)
 class BodeContent:
-    """What is drawn into a Bode diagram: curves and marks of its two panels."""
+    """Curves and marks in the two panels of a Bode diagram."""
 
     gain: list[Curve] = field(default_factory=list)
     phase: list[Curve] = field(default_factory=list)
@@ -66,9 +66,9 @@ def bandwidths(sweeps: Sequence[Named], found: Found, names: Sequence[str]) -> B
 def margins(
     loops: Sequence[Named], phases: Sequence[Array], found: Found, names: Sequence[str]
 ) -> BodeContent:
-    """The distances that the margins are, from 0 dB and from -180 deg, at their frequencies.
+    """Margins as distances from 0 dB and from -180 deg, at their frequencies.
 
-    phases: of each loop, as they are drawn (rad).
+    phases: phase of each loop as drawn (rad).
     """
     drawn = BodeContent()
     for (_, series, loop), shown, read, name in zip(loops, phases, found, names, strict=True):
@@ -90,9 +90,9 @@ def _phase_margin(
 ) -> None:
     assert at.margin is not None  # noqa: S101 (for the type checker; the caller looked)
     frequency, margin = at.frequency.value, at.margin
-    there = float(np.interp(math.log(frequency), np.log(loop.frequency), shown))
-    # The margin is of one branch of the phase, and what is drawn may be of another.
-    base = -np.pi + TURN * round((there - (margin.value - np.pi)) / TURN)
+    phase = float(np.interp(math.log(frequency), np.log(loop.frequency), shown))
+    # The margin and the drawn phase may be of different branches.
+    base = -np.pi + TURN * round((phase - (margin.value - np.pi)) / TURN)
     drawn.phase.append(_distance(frequency, base, base + margin.value, series))
     drawn.phase.append(_dot(frequency, base, margin, 1.0, series))
     label = f"{name}{np.rad2deg(margin.value):.3g}°"
@@ -114,7 +114,7 @@ def _distance(frequency: float, start: float, stop: float, series: str) -> Curve
 
 
 def _dot(frequency: float, base: float, margin: Estimate, sign: float, series: str) -> Curve:
-    """Where a margin ends, with its interval; `sign` is the way it goes from `base`."""
+    """End of a margin, with its interval; `sign` is the direction of the margin from `base`."""
     reach = sorted(base + sign * end for end in ends_of(margin))
     y = np.array([base + sign * margin.value])
     low, high = (np.array([end]) for end in reach)
@@ -138,9 +138,9 @@ def _label(name: str, number: str, count: int) -> str:
 
 
 def servo_figure(sweeps: Sequence[Sweep]) -> Iterator[Figure]:
-    """Bandwidth and margins of each closed loop beside each other, with their intervals.
+    """Bandwidth and margins of the closed loops beside each other, with their intervals.
 
-    None of a single loop: its table says as much.
+    None for a single loop: its table has the same numbers.
     """
     read = [sweep for sweep in sweeps if sweep.found is not None]
     if not 2 <= len(read) <= SIDE_BY_SIDE:
@@ -153,8 +153,8 @@ def servo_figure(sweeps: Sequence[Sweep]) -> Iterator[Figure]:
     )
     panels = []
     for name, label, unit, display in QUANTITIES:
-        found = [getattr(sweep.found, name) for sweep in read]
-        known = [(k, sweep, each) for k, (sweep, each) in enumerate(zip(read, found, strict=True))]
+        values = [getattr(sweep.found, name) for sweep in read]
+        known = [(k, sweep, each) for k, (sweep, each) in enumerate(zip(read, values, strict=True))]
         known = [(k, sweep, each) for k, sweep, each in known if math.isfinite(each.value)]
         if known:
             panels.append(
@@ -179,7 +179,7 @@ def servo_figure(sweeps: Sequence[Sweep]) -> Iterator[Figure]:
 
 
 def place_names(sweeps: Sequence[Sweep]) -> list[str]:
-    """A short name for each sweep: its method, or a number where a method is there twice."""
+    """Short name of each sweep: its method, numbered if a method occurs twice."""
     short = [short_label(method(sweep)) for sweep in sweeps]
     if len(set(short)) == len(short):
         return short
@@ -193,7 +193,7 @@ def _beside(place: int, sweep: Sweep, found: Estimate) -> Curve:
 
 
 def _bound(place: int, sweep: Sweep, found: Estimate) -> Iterator[Mark]:
-    """A word beside a dot that is no number but a bound of it, or hardly determined."""
+    """Word beside a dot that is a bound, or not determined."""
     if found.kind != "number":
         word: str = found.kind
     elif not _known(found):

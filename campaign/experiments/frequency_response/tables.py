@@ -22,7 +22,7 @@ from campaign.units import rate_text
 
 @dataclass(frozen=True)
 class Sweep:
-    """One response of the test: its place in the matrix, and what was found in it."""
+    """One response of the test, with its place in the matrix and its servo characteristics."""
 
     place: dict[str, Value]
     loop: str
@@ -48,16 +48,16 @@ def _values(found: ServoCharacteristics) -> dict[str, Estimate]:
 
 
 def closed_findings(sweep: Sweep) -> Iterator[Finding]:
-    """Bandwidth and margins of one closed loop; one beyond the sweep may be a bound."""
+    """Bandwidth and margins of one closed loop; those beyond the sweep may be bounds."""
     if sweep.found is not None:
-        for found in _values(sweep.found).values():
-            # An upper bound speaks to no published cell: nothing says so but its kind.
-            if found.kind != "at most":
-                yield Finding.of(found, sweep.place)
+        for value in _values(sweep.found).values():
+            # An upper bound has no published cell to compare with; only its kind shows it.
+            if value.kind != "at most":
+                yield Finding.of(value, sweep.place)
 
 
 def _pairs(sweeps: list[Sweep]) -> Iterator[tuple[Sweep, Sweep]]:
-    """Each compensated sweep and the one without compensation, where all else is equal."""
+    """Each compensated sweep and the one without compensation, under otherwise equal conditions."""
 
     def rest(sweep: Sweep) -> dict[str, Value]:
         return {k: v for k, v in sweep.place.items() if k != "compensation"}
@@ -69,23 +69,23 @@ def _pairs(sweeps: list[Sweep]) -> Iterator[tuple[Sweep, Sweep]]:
 
 
 def _changes(bare: Sweep, sweep: Sweep) -> dict[str, Estimate]:
-    """By quantity; without those that one of the two sweeps only bounds."""
+    """Changes by quantity, without quantities that one of the two sweeps only bounds."""
     if bare.found is None or sweep.found is None:
         return {}
     before, after = _values(bare.found), _values(sweep.found)
-    told = {name: change(f"{name}_change", before[name], after[name]) for name, *_ in QUANTITIES}
-    return {name: found for name, found in told.items() if found is not None}
+    by_name = {name: change(f"{name}_change", before[name], after[name]) for name, *_ in QUANTITIES}
+    return {name: one for name, one in by_name.items() if one is not None}
 
 
 def changes(sweeps: list[Sweep]) -> Iterator[Finding]:
-    """What compensation changes in them, in Hz, dB and rad."""
+    """Changes by compensation, in Hz, dB and rad."""
     for bare, sweep in _pairs(sweeps):
-        for found in _changes(bare, sweep).values():
-            yield Finding.of(found, sweep.place)
+        for value in _changes(bare, sweep).values():
+            yield Finding.of(value, sweep.place)
 
 
 def closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
-    """Tables 5.3 and 5.9, what compensation changes, and where the margins were read."""
+    """Tables 5.3 and 5.9, changes by compensation, and crossings of the margins."""
     extra = [path for path in paths if path != "compensation"]
     named = (
         Column("compensation", "Compensation"),
@@ -98,9 +98,9 @@ def closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
 
 
 def margin_tables(sweeps: Sequence[Sweep], named: tuple[Column, ...]) -> Iterator[Table]:
-    """Bandwidth and margins, and where they were read; `named`: columns of each sweep's place."""
+    """Bandwidth and margins, and their crossings; `named`: columns of each sweep's place."""
     read = [(sweep, sweep.found) for sweep in sweeps if sweep.found is not None]
-    yield _servo_table(named, [_servo_row(sweep, found) for sweep, found in read])
+    yield _servo_table(named, [_servo_row(sweep, servo) for sweep, servo in read])
     yield Table(
         key="crossovers",
         title="Crossover frequencies of the margins",
@@ -110,7 +110,7 @@ def margin_tables(sweeps: Sequence[Sweep], named: tuple[Column, ...]) -> Iterato
             Column("phase_crossover", "Phase crossover", "Hz", "Hz"),
             Column("crossover", "Phase crossover is"),
         ),
-        rows=tuple({**sweep.place, **_crossover_row(found)} for sweep, found in read),
+        rows=tuple({**sweep.place, **_crossover_row(servo)} for sweep, servo in read),
     )
     yield _all_crossings(named, read)
 
@@ -162,7 +162,7 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
 
 
 def _with_error(name: str, label: str, unit: str, display: str) -> Iterator[Column]:
-    """The column of a quantity, and that of its standard error."""
+    """Columns of a quantity and of its standard error."""
     yield Column(name, label, unit, display)
     name, label = f"{name}_standard_error", "± (1σ)"
     yield Column(name, label, unit, display, reason=ONE_SIGMA(), file_only=True)
@@ -201,8 +201,8 @@ def _all_crossings(
             "phase_margin": each.margin if each.level == "0 dB" else None,
             "crossing": _read(each),
         }
-        for sweep, found in read
-        for each in found.crossings
+        for sweep, servo in read
+        for each in servo.crossings
     ]
     return Table(
         key="all-crossings",
@@ -221,26 +221,26 @@ def _all_crossings(
 
 
 def closed_notes(sweeps: list[Sweep]) -> Iterator[str]:
-    """What could not be read within the sweep."""
+    """Notes on quantities that the sweep does not determine."""
     for sweep in sweeps:
-        found, highest = sweep.found, sweep.response.frequency[-1]
-        if found is None:
+        servo, highest = sweep.found, sweep.response.frequency[-1]
+        if servo is None:
             continue
         yield from _slow_note(sweep)
-        gain = found.crossing(found.gain_margin)
-        width = found.bandwidth
+        gain = servo.crossing(servo.gain_margin)
+        width = servo.bandwidth
         if width.kind == "number" and math.isnan(width.value):
             yield f"With {sweep.label} there is no bandwidth: {width.reason}."
         elif width.kind != "number":
             yield f"With {sweep.label} the gain does not fall through -3 dB within the sweep."
-        if math.isnan(found.phase_margin.value):
+        if math.isnan(servo.phase_margin.value):
             yield f"With {sweep.label} the open loop does not cross 0 dB in or near the sweep."
-        elif math.isnan(found.gain_margin.value):
+        elif math.isnan(servo.gain_margin.value):
             yield f"With {sweep.label} the phase does not cross -180° in or near the sweep."
-        elif found.gain_margin.kind == "at least":
+        elif servo.gain_margin.kind == "at least":
             yield (
                 f"With {sweep.label} the phase does not surely cross -180° within the sweep's "
-                f"{highest:.4g} Hz: the gain margin is a bound ({found.gain_margin.method})."
+                f"{highest:.4g} Hz: the gain margin is a bound ({servo.gain_margin.method})."
             )
         elif gain is not None and gain.extrapolated:
             yield (
@@ -252,7 +252,7 @@ def closed_notes(sweeps: list[Sweep]) -> Iterator[str]:
 
 
 def _slow_note(sweep: Sweep) -> Iterator[str]:
-    """Where a loop does not follow its slowest command: its unit or a sign may be wrong."""
+    """Note on a loop that does not follow its slowest command: its unit or a sign may be wrong."""
     response = sweep.response
     lowest, level = float(response.frequency[0]), float(response.level[0])
     phase, unsure = float(response.phase[0]), float(response.relative_error[0])
@@ -272,13 +272,13 @@ def _slow_note(sweep: Sweep) -> Iterator[str]:
 
 
 FOLLOWS = 20.0 * math.log10(2.0)
-"""dB by which the gain at the lowest frequency may be off before that is worth a word."""
+"""Largest error of the gain at the lowest frequency without a note (dB)."""
 SURELY = 3.0
-"""standard deviations beyond that."""
+"""Standard deviations beyond `FOLLOWS`."""
 
 
 def quality_note(sweeps: list[Sweep]) -> Iterator[str]:
-    """How far the response is one of a linear system."""
+    """Notes on the linearity of the response."""
     for sweep in sweeps:
         coherence = sweep.response.coherence
         worst = int(np.argmin(coherence))
@@ -293,7 +293,7 @@ def quality_note(sweeps: list[Sweep]) -> Iterator[str]:
 def modes(
     sweeps: list[Sweep], paths: list[str]
 ) -> tuple[Table, tuple[Finding, ...], tuple[str, ...]]:
-    """The elastic modes of open loops: a table, findings, and a sentence where there is none."""
+    """Elastic modes of open loops: a table, findings, and notes on loops without a mode."""
     rows: list[Mapping[str, Cell]] = []
     findings: list[Finding] = []
     notes: list[str] = []
@@ -328,7 +328,7 @@ def modes(
 
 
 def falling_amplitude(group: Sequence[TrialData]) -> Iterator[str]:
-    """A sentence where limits lowered the amplitude of a rate command along the sweep."""
+    """Note if limits reduced the amplitude of a rate command along the sweep."""
     sines = [i.trial.task.command for i in group if i.trial.task.mode == "rate"]
     full = [s for s in sines if isinstance(s, Sine)]
     if not full:

@@ -17,21 +17,21 @@ from campaign.units import angle_text
 SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
 TURNED = 1.1
-"""times what an integral takes to turn round: what is chosen is rounded down."""
+"""Factor on the reversal angle of the integral, because chosen values are rounded down."""
 UNKNOWN_LOOP = 1.0
-"""s to settle where nobody says how fast the rate loop is: ten time constants of one of 1.6 Hz."""
+"""Settling time (s) of an unknown rate loop: ten time constants of a loop of 1.6 Hz."""
 RAMP = 0.5
-"""s from rest to the fastest speed of a map."""
+"""Time (s) from rest to the fastest speed of a map."""
 MINUTE = 60.0
-"""s that a run of a map takes at most, one way."""
+"""Longest run (s) of a map, one way."""
 SLOWEST = 0.1
-"""of the fastest speed of a map, at most: its slowest, so that it is a curve."""
+"""Largest ratio of the slowest to the fastest speed, so that the map shows a curve."""
 FEW = 5.0
-"""times that, where the loop is too weak to turn friction round at lower speeds."""
+"""Factor on `SLOWEST` if the loop is too weak to reverse friction at lower speeds."""
 ROUNDED = 1.1
-"""times what a run needs: rounding takes up to a twentieth of it."""
+"""Factor on the time that a run needs: rounding removes up to a twentieth."""
 SPEEDS = 40
-"""of a map: the fit needs some ten, the rest shows where the curve is not the model's."""
+"""Speeds of a map: the fit needs some ten, the rest shows where the curve leaves the model."""
 
 
 def velocity_map(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
@@ -86,11 +86,11 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     memory = rig.presliding or 0.0
     undescribed = {"a usual size; friction is not described": usual(0.75)}
     turned = rig.unwinding(0.0)
-    told = (
+    reversal_text = (
         f"{SETTLED:.0f} times Ts/σ0 of {angle_text(memory, '.2g')}, once the loop's "
         f"integral has reversed in {angle_text(turned, '.2g')}"
     )
-    known = bench.friction and {told: SETTLED * memory + TURNED * turned}
+    known = bench.friction and {reversal_text: SETTLED * memory + TURNED * turned}
     slow = {} if own else {"half of the travel at slow speeds": 0.5 * longest * SLOWEST * fastest}
     settle = choices.least(
         "settle_angle",
@@ -125,7 +125,7 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
 
 
 def _warm_up_cycles(choices: Choices, run: float, duration: float) -> None:
-    """As many moves out and back, of two runs (s) and two rests each, as a trial may last."""
+    """As many moves out and back as fit into a trial, each of two runs (s) and two rests."""
     rest = choices.options.rest
     most = int((MOST * duration - rest) / (2.0 * (run + rest)))
     usual_number = choices.options.warm_up_cycles
@@ -134,9 +134,9 @@ def _warm_up_cycles(choices: Choices, run: float, duration: float) -> None:
 
 
 def _longest_run(duration: float, rest: float) -> float:
-    """How long (s) a run of a map may take, one way: two and three rests are a trial.
+    """Longest run (s) of a map, one way: a trial has two runs and three rests.
 
-    Raises ValueError where the limit of duration leaves it none.
+    Raises ValueError if the limit of duration leaves no time for a run.
     """
     longest = 0.5 * (MOST * duration - 3.0 * rest)
     if longest <= 0:
@@ -161,7 +161,7 @@ def _slowest(
     turning: float,
     most: float,
 ) -> float:
-    """Lowest rate (rad/s): where the curve bends, above the gyro's noise, in the time there is."""
+    """Lowest rate (rad/s), from the curve's bend, sensor noise and counts, loop and time."""
     vs = rig.stribeck_velocity
     bend = (
         {"a thirtieth of the Stribeck velocity": vs / 30} if vs else {"a usual size": usual(0.05)}
@@ -181,7 +181,7 @@ def _slowest(
 
 
 def _settling(rig: Rig, options: Any) -> tuple[float, str]:
-    """How long (s) runs at constant speed settle, and why that long."""
+    """Settling time (s) of runs at constant speed, and its reason."""
     if "settle_time" in options.model_fields_set:
         return float(options.settle_time), "as written"
     if rig.loop_time is None:

@@ -27,9 +27,9 @@ TORQUE = Axis("Friction torque", "N m", "N m")
 SPEED = Axis("Speed", "rad/s", "deg/s", scale="log")
 OWN_TORQUE = Axis("Friction, in its direction", "N m", "N m")
 LEVEL = 1e-3
-"""of the largest friction, that anybody sees."""
+"""Smallest visible change, relative to the largest friction."""
 TALLEST, HEADROOM = 1.7, 1.4
-"""times the mean torque: the peak of a start from which on it is cut, and what is left above."""
+"""Over the mean torque: a start peak above the first is cut off, at the second."""
 FINE = 160
 """Points of a fitted curve."""
 
@@ -68,7 +68,7 @@ def map_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
 
 
 def _points(curves: Curves, name: str, read: Callable[[Point], Estimate]) -> Curve:
-    """The points of a direction as they were measured, signed."""
+    """Measured points of a direction, signed."""
     own = [point for point in curves.points if point.sign == DIRECTIONS[name]]
     own.sort(key=lambda point: point.rate.value)
     rate = np.array([point.rate.value for point in own])
@@ -76,7 +76,7 @@ def _points(curves: Curves, name: str, read: Callable[[Point], Estimate]) -> Cur
 
 
 def point_bars(fit: DirectionFit, label: str, series: str) -> Curve:
-    """The points of one direction, as they were fitted, with their 95 % intervals."""
+    """Points of one direction as used in the fit, with their 95 % intervals."""
     half = student(fit.freedom) * fit.deviation
     low, high = fit.torque - half, fit.torque + half
     return Curve(fit.speed, fit.torque, label, series, "points", low=low, high=high)
@@ -90,7 +90,7 @@ def _fitted(
     model: Model | None = "free",
     sign: float = 1.0,
 ) -> Curve:
-    """What was fitted to a direction, with its band; sign: -1 shows it at negative rates."""
+    """Fitted curve of a direction, with its band; sign: -1 shows it at negative rates."""
     own = [abs(p.rate.value) for p in curves.points if p.sign == DIRECTIONS[name]]
     fine = np.geomspace(min(own), max(own), FINE)
     y, low, high = (sign * each for each in curves.curve(name, fine, model))
@@ -98,24 +98,24 @@ def _fitted(
 
 
 def _in_order(curve: Curve) -> Curve:
-    """With the lower end of its intervals below the upper one."""
+    """The curve with the lower ends of its intervals below the upper ones."""
     ends = np.sort(np.array([curve.low, curve.high]), axis=0)
     return replace(curve, low=ends[0], high=ends[1])
 
 
 def _law(curve: Curve, direction: str) -> Curve:
-    """A fitted curve that may be compared with published parameters of its direction."""
+    """A fitted curve with its law, for comparison with published parameters of its direction."""
     return replace(curve, conditions={"direction": direction}, law=stribeck, parameters=UNITS)
 
 
 def falls(fit: DirectionFit) -> bool:
-    """Whether friction falls as sliding becomes faster, beyond what scatter leaves open."""
+    """Whether friction falls with rising speed by more than the scatter."""
     values = fit.fits["free"].values
     return fit.shows_stribeck_effect and values["static_torque"] > values["coulomb_torque"]
 
 
 def _least(fit: DirectionFit) -> tuple[float, float] | None:
-    """Speed (rad/s) and torque (N m) where the fitted friction is least; None at an end."""
+    """Speed (rad/s) and torque (N m) of the least fitted friction; None at an end."""
     fine = np.geomspace(fit.speed.min(), fit.speed.max(), FINE)
     torque = stribeck(fine, fit.fits["free"].values)
     at = int(np.argmin(torque))
@@ -123,7 +123,7 @@ def _least(fit: DirectionFit) -> tuple[float, float] | None:
 
 
 def _least_marks(fits: Curves) -> dict[str, list[Mark]]:
-    """Where the friction of each direction is least, if it falls at all."""
+    """Mark of the least friction of each direction, if friction falls."""
     marks: dict[str, list[Mark]] = {name: [] for name in fits.fits}
     for name, fit in fits.fits.items():
         least = _least(fit) if falls(fit) else None
@@ -135,7 +135,7 @@ def _least_marks(fits: Curves) -> dict[str, list[Mark]]:
 
 
 def _what_shows(fits: Curves) -> str:
-    """What the fits say of friction at low and at high speed: true of this map."""
+    """What the fits of this map show at low and at high speed, in words."""
     fall = [name for name, fit in fits.fits.items() if falls(fit)]
     rise = [name for name in fits.fits if _rises(fits, name)]
     effect = "friction falls as sliding becomes faster (Stribeck effect)"
@@ -151,12 +151,12 @@ def _what_shows(fits: Curves) -> str:
 
 
 def _of(names: list[str], fits: Curves) -> str:
-    """Which directions a sentence is about, where it is not about all."""
+    """Directions that a sentence is about, in words; empty for all."""
     return "" if len(names) == len(fits.fits) else f" in the {listed(names)} direction"
 
 
 def _rises(fits: Curves, name: str) -> bool:
-    """Whether friction rises with speed, beyond what scatter leaves open and anybody sees."""
+    """Whether friction rises with speed by more than the scatter, and visibly."""
     fit = fits.fits[name]
     seen = LEVEL * float(fit.torque.max()) / float(fit.speed.max())
     return surely_above(fits.estimates("free")[name]["viscous_friction"], 0.0, seen)
@@ -209,12 +209,12 @@ def _residual_panel(fit: DirectionFit, name: str) -> Panel:
 
 
 def _difference(speed: Array, values: Mapping[str, float], less: Mapping[str, float]) -> Array:
-    """Friction torque (N m) of one set of parameters less that of another, shape (n,)."""
+    """Friction torque (N m) of one set of parameters minus that of another, shape (n,)."""
     return stribeck(speed, values) - stribeck(speed, less)
 
 
 def _misfit(fits: Mapping[str, DirectionFit]) -> str:
-    """How much worse δ = 2 fits, by direction, and which model is to be preferred."""
+    """Misfit of δ = 2 relative to δ free, by direction, and the model of lowest BIC, in words."""
     words = [
         f"{fit.misfit:.2g} times ({name} direction; lowest BIC: {MODEL_LABELS[fit.preferred]})"
         for name, fit in fits.items()
@@ -238,7 +238,7 @@ def rate_figure(curves: Curves, suffix: str = "") -> Figure:
 
 
 def rate_caption(curves: Curves) -> str:
-    """What `rate_panels` shows."""
+    """Caption of `rate_panels`."""
     runs = any(point.commanded is not None for point in curves.points)
     one, several = ("run", "runs") if runs else ("steady stretch", "steady stretches")
     fitted = "Lines: what was fitted to each direction, with its 95 % band; "
@@ -250,7 +250,7 @@ def rate_caption(curves: Curves) -> str:
 
 
 def rate_panels(curves: Curves) -> tuple[Panel, ...]:
-    """Points and what was fitted to them, with their signs and both directions on each other."""
+    """Points and fitted curves, signed, and with both directions on each other."""
     signed: list[Curve] = []
     against: list[Curve] = []
     for name, sign in DIRECTIONS.items():
@@ -278,8 +278,8 @@ def rate_panels(curves: Curves) -> tuple[Panel, ...]:
 
 
 def example_figure(data: TestData) -> tuple[Figure, ...]:
-    """The time history of one point: the middle one of the first map."""
-    # A stretch that was found in a recording has one direction, and no start of its own.
+    """Time history of one point: the middle one of the first map."""
+    # A steady stretch of a recording has one direction, and no start of its own.
     measured = [
         item
         for item in with_samples(data.completed())
@@ -290,7 +290,7 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
     item = measured[len(measured) // 2]
     window = windows_of(item.trial)["positive"]
     back = windows_of(item.trial)["negative"]
-    # One run: the way back has its window one leg later.
+    # One run: the window of the way back is one leg later.
     recording = item.recording().window(0.0, back.start - window.start)
     marks = (Mark("averaged", x=window.start, until=window.stop),)
     time = Axis("Time", "s", "s")
@@ -307,7 +307,7 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
     if level is not None:
         ends = np.array([window.start, window.stop])
         near.append(Curve(ends, np.full(2, level), "mean", "fit"))
-    told = "" if level is None else f", {amount(level, 'N m')} here,"
+    mean_text = "" if level is None else f", {amount(level, 'N m')} here,"
     above = _cut_above(whole, level)
     start = "" if above is None else _cut_words(whole)
     return (
@@ -316,7 +316,7 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
             title=f"One point of the map: {speed}",
             caption=f"(a) Rate and (b) drive torque of one run at {speed}, (c) the torque of its "
             f"shaded stretch alone. {start}The friction torque at this speed is the mean torque "
-            f"of that stretch{told} less inertia times acceleration.",
+            f"of that stretch{mean_text} less inertia times acceleration.",
             alt="Rate and drive torque over time for one constant-velocity run, with the averaging "
             "window shaded.",
             panels=(
@@ -331,7 +331,7 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
 
 
 def _cut_above(torque: Array, level: float | None) -> tuple[float, float] | None:
-    """Limits (N m) that cut off the peak of the start; None where there is none in the way."""
+    """Limits (N m) that cut off a tall peak of the start; None without such a peak."""
     if level is None or level <= 0 or not np.nanmax(torque) > TALLEST * level:
         return None
     return -np.inf, HEADROOM * level

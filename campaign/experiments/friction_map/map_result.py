@@ -1,6 +1,6 @@
 """Result of a friction-velocity map, for a report and for `campaign identify`.
 
-Runs of a map are analysed as in their report; stretches of other recordings as in theirs.
+Runs of a map and stretches of other recordings are analysed as in their reports.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from campaign.result import Finding, Result
 
 
 def one_map(group: Sequence[TrialData], suffix: str = "") -> tuple[Result, Curves]:
-    """The map of runs at one place of a test's matrix."""
+    """Result and curves of the map from runs at one place of a test's matrix."""
     place = {k: v for k, v in group[0].trial.point.items() if k not in OWN}
-    told = {k: v for k, v in place.items() if isinstance(v, str | int | float | bool)}
+    conditions = {k: v for k, v in place.items() if isinstance(v, str | int | float | bool)}
     where = ", ".join(f"{k} = {v}" for k, v in place.items())
     notes: list[str] = []
     kept, left = steady(points_of(settled_enough(group, notes), notes), notes)
@@ -48,11 +48,11 @@ def one_map(group: Sequence[TrialData], suffix: str = "") -> tuple[Result, Curve
     points = point_table((*fits.points, *left), group[0], suffix, where)
     if not fits.is_map:
         notes += (f"{where}: {note}" if where else note for note in fits.notes)
-        found = by_direction(parameters_of(fits)) if fits.points else {}
+        estimates = by_direction(parameters_of(fits)) if fits.points else {}
         result = Result(
             (points,),
-            (rate_figure(fits, suffix),) if found else (),
-            tuple(curve_findings(found, told)),
+            (rate_figure(fits, suffix),) if estimates else (),
+            tuple(curve_findings(estimates, conditions)),
             tuple(notes),
         )
         return result, fits
@@ -60,21 +60,21 @@ def one_map(group: Sequence[TrialData], suffix: str = "") -> tuple[Result, Curve
     result = Result(
         (parameter_table(fits, suffix, where), model_table(fits, suffix, where), points),
         (map_figure(fits, suffix, where, shown), fit_figure(fits, suffix, where, shown)),
-        tuple(map_findings(fits, told)),
+        tuple(map_findings(fits, conditions)),
         (*notes, *map_notes(fits, where)),
     )
     return result, fits
 
 
 def _suits(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
-    """The runs of maps; without any, all trials with a rate and a torque."""
-    found = [each for each in trials if is_run(each)]
-    for each in () if found else trials:
+    """Runs of maps; without any, all trials with a rate and a torque."""
+    suitable = [each for each in trials if is_run(each)]
+    for each in () if suitable else trials:
         names = each.channel_names()
         if RELATIVE_RATE in names and names & {DRIVE_TORQUE, JOINT_TORQUE}:
-            found.append(each)
+            suitable.append(each)
     why = f"no trial has {RELATIVE_RATE}, and {DRIVE_TORQUE} or {JOINT_TORQUE}"
-    return found, "" if found else why
+    return suitable, "" if suitable else why
 
 
 def is_run(data: TrialData) -> bool:
@@ -85,7 +85,7 @@ def is_run(data: TrialData) -> bool:
 
 
 def identified(data: TestData) -> Result:
-    """Friction over rate, by direction. Raises ValueError where there is none."""
+    """Friction over rate, by direction. Raises ValueError if there is none."""
     runs = tuple(each for each in data.completed() if is_run(each))
     curves: Curves | None
     lost: tuple[Reason, ...] = ()
@@ -113,14 +113,14 @@ def identified(data: TestData) -> Result:
 def _settings(
     found: dict[str, dict[str, Estimate]], parameters: Sequence[Parameter]
 ) -> dict[str, tuple[object, str, str]]:
-    """All that a curve needs besides: what is not measured is that of the fitted curve.
+    """Bench keys that complete a curve, with values of the fitted curve for what is not measured.
 
-    So that nothing stands beside a measured number that the data contradict.
+    Other values could contradict the data beside a measured number.
     """
     keys = {each.bench for each in parameters if each.bench}
     if not keys:
         return {}
-    told: dict[str, tuple[object, str, str]] = {
+    filled: dict[str, tuple[object, str, str]] = {
         "friction.load.model": ("stribeck", "", "friction of steady sliding")
     }
     for direction, estimates in found.items():
@@ -129,8 +129,8 @@ def _settings(
         fitted = {name: one.value for name, one in estimates.items() if one.kind == "number"}
         for name, value in ({"viscous_friction": 0.0} | line | fitted).items():
             if name in KEYS and prefix + name not in keys:
-                told[prefix + name] = (max(value, 0.0), MEANINGS[name][0], "of the fitted curve")
-    return told
+                filled[prefix + name] = (max(value, 0.0), MEANINGS[name][0], "of the fitted curve")
+    return filled
 
 
 MODEL = Model(

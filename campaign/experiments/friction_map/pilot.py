@@ -1,9 +1,9 @@
 """The pilot of a friction map: a few speeds that decide the others.
 
-The pilot's speeds are spread evenly over those of the plain map. Its runs settle for as long as
-they measure, for nobody knows friction yet, and are points of the map where that was long enough.
-What follows has the rest of `points`, between the same slowest and fastest speed
-(`velocity_map_choice`).
+The pilot's speeds are spread evenly over those of the plain map. Friction is still unknown, so its
+runs settle for as long as they measure. They are points of the map if they settled long enough. The
+runs that follow have the rest of `points`, between the same slowest and fastest speed
+(`estimation/map_design.py`).
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from campaign.trial import NONE_MORE, Most, TrialRequest
 from campaign.units import angle_text, in_words, torque_text
 
 SPEEDS = 10
-"""of a pilot: twice as many as Equation 4.6 has parameters."""
+"""Speeds of a pilot: twice as many as Equation 4.6 has parameters."""
 FEWEST = 2 * SPEEDS
-"""points of a map with a pilot: as many after it as in it."""
+"""Fewest points of a map with a pilot: half of them in the pilot."""
 REVERSAL = "reversal"
-"""Window of a pilot's run: from the turn until the way back is settled. No other run has one."""
+"""Window of a pilot's run, and of no other: from the turn until the way back is settled."""
 
 
 class PilotedMapOptions(VelocityMapOptions):
@@ -59,9 +59,9 @@ class PilotedMapOptions(VelocityMapOptions):
 
 
 def pilot_speeds(options: VelocityMapOptions) -> tuple[float, ...]:
-    """Speeds of the pilot (rad/s), rising: among those of the plain map, as evenly as these are.
+    """Speeds of the pilot (rad/s), rising: evenly spaced among those of the plain map.
 
-    Raises ValueError for options that leave nothing to be chosen.
+    Raises ValueError for options that leave no choice of speeds.
     """
     if options.speeds:
         raise ValueError("a pilot chooses speeds: write slowest and fastest instead of speeds")
@@ -88,7 +88,7 @@ def trials(options: PilotedMapOptions, bench: Bench) -> Iterator[TrialRequest]:
 
 
 def pilot_run(run: Run) -> Run:
-    """The same, with what is settled in its second half at most."""
+    """The same run, with its settled part in the second half at most."""
     settle = max(run.settle, 0.5 * run.cruise)
     room = run.cruise - settle
     if run.window <= room:
@@ -97,7 +97,7 @@ def pilot_run(run: Run) -> Run:
 
 
 def most(options: PilotedMapOptions, bench: Bench) -> Most:
-    """What follows a pilot at most: every trial as long as max_time allows."""
+    """Upper limit of what follows a pilot: every trial as long as max_time allows."""
     if not options.pilot:
         return NONE_MORE
     count = (options.points - SPEEDS) * max(1, len(options.start_angles))
@@ -107,9 +107,9 @@ def most(options: PilotedMapOptions, bench: Bench) -> Most:
 
 
 def settled_enough(group: Sequence[TrialData], notes: list[str]) -> list[TrialData]:
-    """The runs of a map without those of its pilot that settled for less than what followed does.
+    """Runs of a map, without pilot runs that settled for less than those that followed.
 
-    What became of the pilot, and what was left out, is told in `notes`.
+    `notes` report the pilot's outcome and the runs left out.
     """
     first = [item for item in group if REVERSAL in windows_of(item.trial)]
     then = [item for item in group if REVERSAL not in windows_of(item.trial)]
@@ -130,13 +130,13 @@ def settled_enough(group: Sequence[TrialData], notes: list[str]) -> list[TrialDa
 
 
 FINER = 3
-"""speeds to choose among for each of `points`."""
+"""Candidate speeds per point of `points`."""
 HALF = 0.5
-"""Share of a window that a longer settling may take, where a speed is still run."""
+"""Least share of the plain window that remains after longer settling, for a speed to be run."""
 PERIODS = 1.05
-"""of the ripple that a window spans."""
+"""Periods of the ripple that a window spans."""
 SLOW = 3
-"""speeds of a pilot, the slowest, whose reversals tell friction's memory."""
+"""Number of the slowest pilot speeds whose reversals determine friction's memory."""
 
 
 @dataclass(frozen=True)
@@ -144,9 +144,9 @@ class Choice:
     """What follows from a pilot.
 
     Attributes:
-        options: those of the runs that follow: settling and windows as friction asks for.
-        speeds: at which they are (rad/s), rising.
-        reason: what was found, and what follows from it; for the archive and the page.
+        options: options of the runs that follow; settling and windows suit the friction.
+        speeds: speeds of these runs (rad/s), rising.
+        reason: estimated friction and its consequences; for the archive and the page.
     """
 
     options: VelocityMapOptions
@@ -155,7 +155,7 @@ class Choice:
 
 
 def following(options: PilotedMapOptions, bench: Bench, data: TestData) -> Iterator[TrialRequest]:
-    """The runs after the pilot."""
+    """Requests of the runs after the pilot."""
     choice, rig = choose(options, bench, tuple(data.completed())), Rig(bench)
     for number, speed in enumerate(choice.speeds, start=SPEEDS):
         run = plan_run(speed, choice.options)
@@ -164,7 +164,7 @@ def following(options: PilotedMapOptions, bench: Bench, data: TestData) -> Itera
 
 
 def choose(options: PilotedMapOptions, bench: Bench, pilot: Sequence[TrialData]) -> Choice:
-    """What the pilot's recordings ask for; the rest of the plain map where they say nothing."""
+    """Choice from the pilot's recordings; the rest of the plain map if they show too little."""
     points, _ = steady(points_of(pilot, []), [])
     try:
         if not points:
@@ -174,16 +174,16 @@ def choose(options: PilotedMapOptions, bench: Bench, pilot: Sequence[TrialData])
         longer = _longer(options, bench, fits, _memory(pilot))
         speeds = _speeds(options, longer, points, curves)
     except ValueError as error:
-        told = f"after a pilot that shows too little of friction: {error}"
-        return Choice(options, _plain(options, points), told)
+        reason = f"after a pilot that shows too little of friction: {error}"
+        return Choice(options, _plain(options, points), reason)
     return Choice(longer, speeds, _reason(options, longer, fits))
 
 
 def _plain(options: PilotedMapOptions, points: Sequence[Point]) -> tuple[float, ...]:
-    """The rest of the plain map; between the speeds at which the pilot slid steadily."""
+    """Remaining speeds of the plain map, or a series over the pilot's range of steady speeds."""
     done = set(pilot_speeds(options))
-    found = [abs(point.speed) for point in points] or [options.slowest, options.fastest]
-    slowest, fastest = min(found), max(found)
+    steadily = [abs(point.speed) for point in points] or [options.slowest, options.fastest]
+    slowest, fastest = min(steadily), max(steadily)
     if slowest <= options.slowest * (1.0 + ROUNDING) and fastest >= max(done) * (1.0 - ROUNDING):
         return tuple(speed for speed in map_speeds(options) if speed not in done)
     between = np.geomspace(slowest, fastest, options.points - SPEEDS + 2)[1:-1]
@@ -191,15 +191,15 @@ def _plain(options: PilotedMapOptions, points: Sequence[Point]) -> tuple[float, 
 
 
 def _curves(fits: Curves) -> list[Mapping[str, float]]:
-    """Curves that the pilot leaves possible. ValueError where neither direction shows one."""
+    """Curves that the pilot's fits allow. Raises ValueError if neither direction shows one."""
     curves: list[Mapping[str, float]] = []
     for direction, fit in fits.fits.items():
-        found = fits.estimates("free")[direction]
-        torques = (found["static_torque"].origin, found["coulomb_torque"].origin)
+        curve = fits.estimates("free")[direction]
+        torques = (curve["static_torque"].origin, curve["coulomb_torque"].origin)
         if not fit.shows_stribeck_effect or torques != (Origin.MEASURED, Origin.MEASURED):
             continue
-        values = {name: found[name].value for name in PARAMETERS}
-        errors = (_relative_error(found[f"stribeck_{name}"]) for name in ("velocity", "exponent"))
+        values = {name: curve[name].value for name in PARAMETERS}
+        errors = (_relative_error(curve[f"stribeck_{name}"]) for name in ("velocity", "exponent"))
         curves += curves_around(values, *errors)
     if not curves:
         raise ValueError("it shows no Stribeck effect")
@@ -207,19 +207,19 @@ def _curves(fits: Curves) -> list[Mapping[str, float]]:
 
 
 def _relative_error(found: Estimate) -> float:
-    """1 sigma over the value; infinite where it has none."""
+    """Standard error over the value; infinite without one."""
     return np.inf if found.standard_error is None else found.standard_error / found.value
 
 
 def _memory(pilot: Sequence[TrialData]) -> float:
-    """Ts / sigma0 (rad), the largest that a reversal of the slowest runs shows; NaN without any."""
+    """Largest Ts / sigma0 (rad) that reversals of the slowest runs show; NaN without any."""
     slowest = sorted({speed_of(item.trial) for item in pilot})[:SLOW]
-    found = [_reversal(item) for item in pilot if speed_of(item.trial) in slowest]
-    return max((angle for angle in found if np.isfinite(angle)), default=np.nan)
+    angles = [_reversal(item) for item in pilot if speed_of(item.trial) in slowest]
+    return max((angle for angle in angles if np.isfinite(angle)), default=np.nan)
 
 
 def _reversal(item: TrialData) -> float:
-    """Ts / sigma0 (rad) from the way back of one run; NaN where it tells none."""
+    """Ts / sigma0 (rad) from the way back of one run; NaN if it shows none."""
     turn = windows_of(item.trial)[REVERSAL]
     cut = item.recording().window(turn.start, turn.stop)
     rate = cut[GYRO_RATE]
@@ -236,11 +236,11 @@ def _reversal(item: TrialData) -> float:
 def _longer(
     options: PilotedMapOptions, bench: Bench, fits: Curves, memory: float
 ) -> VelocityMapOptions:
-    """Options whose settling and windows are long enough for the friction that was found.
+    """Options with settling and windows long enough for the estimated friction.
 
-    Settling: `MEMORIES` of friction's memory (rad), once the loop's integral has turned round the
+    Settling: `MEMORIES` of friction's memory (rad), after the loop's integral has reversed the
     torque of the slowest runs. Windows average over whole periods of a ripple. Neither is shorter
-    than `options` has it.
+    than in `options`.
     """
     slowest = sorted({abs(point.speed) for point in fits.points})[:SLOW]
     torque = max(abs(p.torque.value) for p in fits.points if abs(p.speed) in slowest)
@@ -258,9 +258,9 @@ def _speeds(
     points: Sequence[Point],
     curves: Sequence[Mapping[str, float]],
 ) -> tuple[float, ...]:
-    """The speeds that tell most, from the slowest at which the pilot slid steadily.
+    """Most informative speeds (rad/s), from the pilot's slowest steady speed on.
 
-    ValueError where no run has room to settle for as long as friction asks.
+    Raises ValueError if no run has room for the required settling.
     """
     steadily = np.unique([abs(point.speed) for point in points])
     own = {speed: pilot_run(plan_run(speed, options)) for speed in pilot_speeds(options)}
@@ -269,7 +269,7 @@ def _speeds(
     fastest = steadily[-1] if steadily[-1] < max(own) else options.fastest
     offered = np.geomspace(steadily[0], fastest, FINER * options.points)
     apart = np.min(np.abs(np.log(offered[:, None] / steadily)), axis=1)
-    offered = offered[apart > ROUNDING]  # a repeat would be averaged with what it repeats
+    offered = offered[apart > ROUNDING]  # a repeated speed would be averaged
     candidates = np.array([speed for speed in offered if _fits(float(speed), options, longer)])
     if not len(candidates) or not len(measured):
         angle = angle_text(longer.settle_angle)
@@ -279,7 +279,7 @@ def _speeds(
 
 
 def _fits(speed: float, options: VelocityMapOptions, longer: VelocityMapOptions) -> bool:
-    """Whether a run at `speed` (rad/s) has room to settle for longer, and to measure then."""
+    """Whether a run at `speed` (rad/s) has room for longer settling and a window after it."""
     plain = plan_run(speed, options)
     try:
         run = plan_run(speed, longer)
@@ -289,22 +289,22 @@ def _fits(speed: float, options: VelocityMapOptions, longer: VelocityMapOptions)
 
 
 def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: Curves) -> str:
-    found = {
-        name: float(np.mean([fits.fits[way].fits["free"].values[name] for way in DIRECTIONS]))
+    means = {
+        name: float(np.mean([fits.fits[side].fits["free"].values[name] for side in DIRECTIONS]))
         for name in PARAMETERS
     }
-    told = (
-        f"where a pilot shows that it determines most: Ts {torque_text(found['static_torque'])}, "
-        f"Tc {torque_text(found['coulomb_torque'])}, "
-        f"vs {in_words(found['stribeck_velocity'], 'rad/s', 'deg/s')}, "
-        f"δ {found['stribeck_exponent']:.2g}"
+    reason = (
+        f"where a pilot shows that it determines most: Ts {torque_text(means['static_torque'])}, "
+        f"Tc {torque_text(means['coulomb_torque'])}, "
+        f"vs {in_words(means['stribeck_velocity'], 'rad/s', 'deg/s')}, "
+        f"δ {means['stribeck_exponent']:.2g}"
     )
     settle, window = (angle_text(angle) for angle in (longer.settle_angle, longer.window_angle))
     if longer.settle_angle > options.settle_angle:
-        told += f"; settled for {settle}, as its reversals ask for"
+        reason += f"; settled for {settle}, as its reversals ask for"
     if longer.window_angle > options.window_angle:
-        told += f"; averaged over {window}, for the ripple's period"
-    return told
+        reason += f"; averaged over {window}, for the ripple's period"
+    return reason
 
 
 STAGE = Stage(

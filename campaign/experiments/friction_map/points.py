@@ -39,17 +39,17 @@ RIPPLE = {
 }  # fmt: skip
 """Metrics of a ripple, with their units."""
 DESCRIBES = Cause("describes the window", "it describes the window")
-"""Why some metrics of a window have no interval."""
+"""Reason for metrics of a window without an interval."""
 
 
 def stated_periods(bench: Bench) -> float | None:
     """Periods per revolution of the largest ripple that the bench describes; None without one."""
-    found = [
+    ripples = [
         (each.ripple.amplitude * float(getattr(each, "static_torque", 1.0)), each.ripple.periods)
         for each in bench.friction.values()
         if each.ripple.amplitude > 0
     ]
-    return max(found)[1] if found else None
+    return max(ripples)[1] if ripples else None
 
 
 def measure(data: TrialData) -> tuple[Estimate, ...]:
@@ -58,9 +58,9 @@ def measure(data: TrialData) -> tuple[Estimate, ...]:
     Names end with the direction. Raises ValueError for a window without samples.
     """
     bench, windows, recording = bench_of(data.trial), windows_of(data.trial), data.recording()
-    found: list[Estimate] = []
+    estimates: list[Estimate] = []
     for name in DIRECTIONS:
-        if name not in windows:  # a stretch that was found, of one direction
+        if name not in windows:  # a steady stretch of a recording has one direction
             continue
         own = windows[name]
         whole = windows.get(WHOLE.format(name), own)
@@ -73,17 +73,17 @@ def measure(data: TrialData) -> tuple[Estimate, ...]:
             cut.angle,
             bench.axis.inertia,
             ripple.periods if ripple else None,
-            # A recording that was imported may have made its rate of an encoder's counts.
+            # The rate of an imported recording may be computed from encoder counts.
             own_sensor=not (data.trial.recording or bench.rate_is_of_encoder),
             commanded=None if data.trial.recording else DIRECTIONS[name] * speed_of(data.trial),
         )
-        found += _metrics(name, sliding, ripple)
-    return tuple(found)
+        estimates += _metrics(name, sliding, ripple)
+    return tuple(estimates)
 
 
 @dataclass(frozen=True)
 class _Samples:
-    """Samples of one window, those that were lost left out; SI, shape (n,)."""
+    """Valid samples of one window, SI, shape (n,)."""
 
     time: Array
     rate: Array
@@ -95,15 +95,15 @@ class _Samples:
         cut = recording.window(window.start, window.stop)
         angle = cut[RELATIVE_ANGLE] if RELATIVE_ANGLE in cut.channels else None
         columns = [cut.time, cut[GYRO_RATE], cut[DRIVE_TORQUE]]
-        there = np.isfinite(np.sum(columns if angle is None else [*columns, angle], axis=0))
-        time, rate, torque = (column[there] for column in columns)
-        return cls(time, rate, torque, None if angle is None else angle[there])
+        valid = np.isfinite(np.sum(columns if angle is None else [*columns, angle], axis=0))
+        time, rate, torque = (column[valid] for column in columns)
+        return cls(time, rate, torque, None if angle is None else angle[valid])
 
 
 def _ripple(cut: _Samples, bench: Bench) -> Harmonic | None:
-    """The ripple that the run shows, at the period that the bench tells or else at its own.
+    """Ripple that the run shows, at the period that the bench states, or else at its own period.
 
-    None where the inertia is not known: friction's ripple and what it makes of the rate are one.
+    None if the inertia is unknown: the ripple of friction and that of the rate are inseparable.
     """
     inertia = bench.axis.inertia
     if len(cut.time) < 3 or cut.angle is None or inertia is None:
@@ -142,22 +142,21 @@ def _metrics(name: str, found: SteadySliding, ripple: Harmonic | None) -> Iterat
 class Point(SteadySliding):
     """Friction at one steady rate, of a run's window or of a stretch: signed, SI.
 
-    What `SteadySliding` has, with the systematic parts of the torque.
+    The attributes of `SteadySliding`, with the systematic parts of the torque's uncertainty.
 
     Attributes:
-        trial, repeat: which trial it is of, and which repetition of it.
-        start, stop: times between which it lies (s).
-        error: deviation of the torque without its ripple (N m), that of the ripple included; NaN
-            where the window shows none.
-        commanded: rate that was asked for (rad/s); None of a stretch that was found.
+        trial, repeat: number of its trial, and of the trial's repetition.
+        start, stop: its times (s).
+        error: standard error of the torque without its ripple (N m), that of the ripple included;
+            NaN if the window shows none.
+        commanded: commanded rate (rad/s); None for a stretch of a recording.
         rule: what set the window.
-        harmonic: the ripple that its run shows, where it is long enough.
-        ripple: what `without_ripple` has taken out of the torque (N m).
+        harmonic: ripple of its run, if the run is long enough.
+        ripple: torque that `without_ripple` removed (N m).
         normal_load: as recorded (N).
-        load: normal load times its arm (N m; N of a linear axis); NaN where nobody recorded it, or
-            a rotary axis has no radius.
-        doubts: what was taken off by the angle may be off by (N m, 1 sigma), one part after the
-            other, each shared by all points.
+        load: normal load times its arm (N m; N of a linear axis); NaN if it or the arm is unknown.
+        doubts: standard uncertainties (N m) of the torque removed by angle, one per part, each
+            shared by all points.
     """
 
     trial: int
@@ -175,23 +174,23 @@ class Point(SteadySliding):
 
     @classmethod
     def of(cls, own: SteadySliding, trial: int, start: float, stop: float, **more: Any) -> Self:
-        """What a window says, with where it is and `more` of its attributes."""
+        """Point of a window's sliding, with its place and `more` attributes."""
         error = own.torque.standard_error
         error = math.nan if error is None else error
         return cls(**vars(own), trial=trial, start=start, stop=stop, error=error, **more)
 
     @property
     def speed(self) -> float:
-        """As commanded; of a stretch its mean rate."""
+        """Commanded rate; of a stretch its mean rate."""
         return self.rate.value if self.commanded is None else self.commanded
 
     @property
     def sign(self) -> float:
-        """+1 or -1: the direction."""
+        """Direction: +1 or -1."""
         return 1.0 if self.speed > 0 else -1.0
 
     def off_by(self, part: int) -> Self:
-        """As it would be if one of `doubts` were so, and there were no other."""
+        """Point shifted by one part of `doubts`, without doubts."""
         torque, off = self.torque, self.doubts[part]
         low, high = (None if end is None else end - off for end in (torque.low, torque.high))
         moved = replace(torque, value=torque.value - off, low=low, high=high)
@@ -207,27 +206,27 @@ def with_constants(
     scales: bool = True,
     loaded: bool = False,
 ) -> Estimate:
-    """With what no point shows: how well constants of the torque and the load are known.
+    """Add the uncertainties of constants of the torque and the load, which no point shows.
 
     Args:
-        data: a trial, which says it.
-        force: the channel that the torque was read from.
-        moved: by how much it moves when the bench's inertia grows to twice its size.
-        scales: whether it is proportional to the torque, and
-        loaded: inversely to the normal load.
+        data: trial that states the constants.
+        force: channel of the torque.
+        moved: change of the estimate if the bench's inertia doubles.
+        scales: whether the estimate is proportional to the torque...
+        loaded: ...and inversely proportional to the normal load.
     """
     bench = bench_of(data.trial)
     if scales:
-        if not data.trial.recording:  # of which the torque has a constant of its own
+        if not data.trial.recording:  # a recording's torque has its own constant
             one = with_systematic(one, bench, TORQUE_CONSTANT, one.value)
         one = with_scale(one, data, force)
-    if force == DRIVE_TORQUE:  # of an inertia that nobody knows this is a part of unknown size
+    if force == DRIVE_TORQUE:  # with an unknown inertia, a part of unknown size
         one = with_systematic(one, bench, INERTIA, moved)
     return with_scale(one, data, NORMAL_LOAD) if scales and loaded else one
 
 
 def coefficient_of(point: Point, data: TrialData) -> Estimate:
-    """Friction over normal load, positive against the motion; data: a trial, as above."""
+    """Friction over normal load, positive against the motion; data: see `with_constants`."""
     one = replace(multiplied(point.torque, point.sign / point.load), name="coefficient", unit="")
     return with_scale(one, data, NORMAL_LOAD)
 
@@ -237,7 +236,7 @@ MORE_COUNTS = "raise max_time, max_travel and window_angle, or begin at a higher
 
 
 def steady(points: Sequence[Point], notes: list[str]) -> tuple[list[Point], list[Point]]:
-    """The points at which the load slid steadily, and the others; `notes` count them by reason."""
+    """Points of steady sliding, and points left out; `notes` count those and the drifting ones."""
     kept = [_with_rule(point, point.drift) for point in points if not point.unsteady]
     left = [_with_rule(point, point.unsteady) for point in points if point.unsteady]
     for code in dict.fromkeys(point.unsteady.code for point in left):
@@ -257,18 +256,18 @@ def steady(points: Sequence[Point], notes: list[str]) -> tuple[list[Point], list
 
 
 def _with_rule(point: Point, reason: Reason) -> Point:
-    """The point with a reason behind what set its window."""
+    """Point with `reason` appended to its rule."""
     return replace(point, rule=f"{point.rule}; {reason}") if reason else point
 
 
 def _speeds(points: Sequence[Point]) -> str:
-    told = (in_words(point.speed, "rad/s", "deg/s").split() for point in points)
-    numbers, units = zip(*told, strict=True)
+    texts = (in_words(point.speed, "rad/s", "deg/s").split() for point in points)
+    numbers, units = zip(*texts, strict=True)
     return f"{', '.join(numbers)} {units[0]}"
 
 
 def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:
-    """What a map leaves in its torques, and does not find, where the bench states no inertia."""
+    """Note on what the friction of a bench without inertia includes, and on the missing ripple."""
     if bench.axis.inertia is None and points:
         most = max(abs(point.acceleration) for point in points)
         yield (
@@ -279,30 +278,30 @@ def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:
 
 
 def points_of(items: Sequence[TrialData], notes: list[str]) -> list[Point]:
-    """The points of several runs of one bench; what one lacks is added to `notes`."""
-    found: list[Point] = []
+    """Points of several runs of one bench; `notes` name the runs without points."""
+    points: list[Point] = []
     for item in items:
         try:
-            found += map_points(item)
+            points += map_points(item)
         except ValueError as error:
             notes.append(f"{item.trial.label} has no points: {error}.")
     if items:
-        notes += _unknown_inertia(found, bench_of(items[0].trial))
-    return found
+        notes += _unknown_inertia(points, bench_of(items[0].trial))
+    return points
 
 
 def map_points(data: TrialData) -> Iterator[Point]:
     """The two points of one run, out and back."""
-    trial, found = data.trial, metrics(data, measure)
+    trial, values = data.trial, metrics(data, measure)
     inertia = bench_of(trial).axis.inertia or 0.0
     for name, window in windows_of(trial).items():
         if name not in DIRECTIONS:
             continue
         end = f"_{name}"
-        own = Metrics({w.removesuffix(end): one for w, one in found.items() if w.endswith(end)})
+        own = Metrics({w.removesuffix(end): one for w, one in values.items() if w.endswith(end)})
         why = {w: own[w].reason if w in own else NONE for w in ("unsteady", "torque_drift")}
         rate, moved = own["rate"], own["acceleration"].value
-        # An archive of a program that asked no more has no reason.
+        # Older archives have no reason for unsteady sliding.
         drifts = drifting(moved * (window.stop - window.start), rate.half_width, rate.value)
         sliding = SteadySliding(
             rate,

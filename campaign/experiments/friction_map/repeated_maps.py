@@ -18,11 +18,11 @@ from campaign.experiments.shared.captions import amount, listed
 from campaign.result import Array, Axis, Curve, Figure, Panel
 
 ASIDE = 0.1
-"""How far the dots of a direction are drawn beside the place of their map, in maps."""
+"""Distance of the dots of a direction from the place of their map, in maps."""
 ROUNDING = 1e-9
-"""of a parameter, that two directions may differ by and be the same."""
+"""Relative difference of a parameter up to which two directions are equal."""
 SHOWN = 6
-"""Most maps on one another: more cannot be told apart."""
+"""Most maps in one figure: more are indistinguishable."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class MapSet:
 
     Attributes:
         name: of its two sets, e.g. "1-2".
-        where: what is particular about it, e.g. `bench.variation.day = 1`.
-        found: by direction and parameter, the exponent free.
+        where: its condition, e.g. `bench.variation.day = 1`.
+        found: estimates with a free exponent, by direction and parameter.
     """
 
     name: str
@@ -45,7 +45,7 @@ class MapSet:
 
 
 def overlay_figure(sets: Sequence[MapSet], trials: tuple[int, ...]) -> Figure:
-    """Figure 4.9: maps on one another, and what each differs from the first."""
+    """Figure 4.9: maps on one another, and their differences from the first."""
     shown = list(sets[:SHOWN])
     maps, changes = [], []
     for direction in DIRECTIONS:
@@ -56,12 +56,12 @@ def overlay_figure(sets: Sequence[MapSet], trials: tuple[int, ...]) -> Figure:
         maps.append(Panel(SPEED, OWN_TORQUE, curves, f"{direction.capitalize()} direction"))
         changes.append(_change_panel(shown, direction))
     count = "first maps" if len(sets) > len(shown) else "maps"
-    told = _drifts(shown)
+    drift_text = _drifts(shown)
     return Figure(
         key="sets",
         title="Overlaid friction-velocity maps",
         caption=f"The same speeds in {len(shown)} {count}, each direction in its own sign"
-        f"{'; below, difference from the first map' if len(shown) > 1 else ''}.{told} "
+        f"{'; below, difference from the first map' if len(shown) > 1 else ''}.{drift_text} "
         "Bars: 95 %, window and scatter between points.",
         alt="Friction torque over speed on a logarithmic axis, one panel per direction, dots of "
         "each map, and the differences of the maps from the first.",
@@ -82,14 +82,14 @@ def _change_panel(sets: Sequence[MapSet], direction: str) -> Panel:
 
 
 def _change(first: MapSet, other: MapSet, direction: str) -> tuple[Array, Array]:
-    """Speeds that both maps have (rad/s), and by how much friction differs there (N m)."""
+    """Speeds that both maps have (rad/s), and the differences of friction there (N m)."""
     one, two = first.fits.fits[direction], other.fits.fits[direction]
-    _, here, there = np.intersect1d(one.place, two.place, return_indices=True)
-    return two.speed[there], two.torque[there] - one.torque[here]
+    _, in_first, in_other = np.intersect1d(one.place, two.place, return_indices=True)
+    return two.speed[in_other], two.torque[in_other] - one.torque[in_first]
 
 
 def _drifts(sets: Sequence[MapSet]) -> str:
-    """By how much the level of friction differs from the first map's, on average over speeds."""
+    """Differences of friction from the first map, as means and ranges over the speeds, in words."""
     parts = []
     for each in sets[1:]:
         words = []
@@ -117,7 +117,7 @@ def scatter_figure(
     deviations: Mapping[str, Estimate],
     trials: tuple[int, ...],
 ) -> Figure:
-    """Each parameter by map and direction, and the mean of all; by parameter the last two."""
+    """Parameters by map and direction, and the mean of all; `means`, `deviations` by parameter."""
     panels = [_scatter_panel(sets, means[name], deviations[name], name) for name in means]
     return Figure(
         key="scatter",
@@ -141,25 +141,25 @@ def _scatter_panel(
     sets_axis = Axis("Sets", limits=(0.5, last + 0.5), places=(*names, (last, "mean")))
     whole = Curve.of([last], [mean], "mean of all", "measured", quantity=parameter)
     curves = [*_dots(sets, parameter), replace(whole, conditions={"statistic": "mean"})]
-    told = f"{100 * deviation.value:.1f} %" if np.isfinite(deviation.value) else "its mean is zero"
-    return Panel(sets_axis, Axis(symbol, unit, unit), curves, f"{symbol}: {told}")
+    share = f"{100 * deviation.value:.1f} %" if np.isfinite(deviation.value) else "its mean is zero"
+    return Panel(sets_axis, Axis(symbol, unit, unit), curves, f"{symbol}: {share}")
 
 
 def _dots(sets: Sequence[MapSet], parameter: str) -> Iterator[Curve]:
-    """One curve for each dot, which is beside another published number than the next."""
+    """One curve per dot, because each dot has its own published number."""
     for direction in DIRECTIONS:
         for place, each in enumerate(sets, start=1):
-            found, aside = each.found[direction][parameter], ASIDE * DIRECTIONS[direction]
-            told = {"set": each.name, "direction": direction}
-            dot = Curve.of([place], [found], f"{direction} direction", direction, aside=aside)
-            yield replace(dot, quantity=parameter, conditions=told)
+            estimate, aside = each.found[direction][parameter], ASIDE * DIRECTIONS[direction]
+            conditions = {"set": each.name, "direction": direction}
+            dot = Curve.of([place], [estimate], f"{direction} direction", direction, aside=aside)
+            yield replace(dot, quantity=parameter, conditions=conditions)
 
 
 def _apart(sets: Sequence[MapSet], means: Mapping[str, Estimate]) -> str:
-    """Which parameters differ between the directions: by the difference in each map, t over maps.
+    """Parameters that differ between the directions: t-tests of the difference in each map.
 
-    Both directions of a map share its day, which their difference is free of. As many tests as
-    parameters are one claim, so each may be wrong by its share of it (Bonferroni).
+    Both directions of a map share its day, and their difference is free of it. All parameters
+    together are one claim: each test has its share of the error probability (Bonferroni).
     """
     level = 1.0 - (1.0 - LEVEL) / len(means)
     apart = []
@@ -174,7 +174,7 @@ def _apart(sets: Sequence[MapSet], means: Mapping[str, Estimate]) -> str:
 
 
 def _differs(values: Array, level: float, spare: float) -> bool:
-    """Whether the mean of independent values, shape (n,), is not zero, and by more than `spare`."""
+    """Whether the mean of independent values, shape (n,), is significant and exceeds `spare`."""
     if len(values) < 2 or not np.isfinite(values).all():
         return False
     error = float(np.std(values, ddof=1)) / math.sqrt(len(values))

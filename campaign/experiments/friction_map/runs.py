@@ -1,7 +1,6 @@
 """Runs of a friction map: planned trial and measured windows of each speed.
 
-Each trial runs out at one speed and back at the same, so it ends where it began and needs no
-homing.
+Each trial runs out and back at one speed. It ends where it began and needs no homing.
 """
 
 from __future__ import annotations
@@ -35,17 +34,17 @@ from campaign.units import (
 )
 
 SMALLEST_WINDOW = 10
-"""samples: fewer say nothing about a mean and a slope."""
+"""Fewest samples for a mean and a slope."""
 DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 WHOLE = "settled {}"
-"""Name of the window of all that a run has behind its settling, by direction."""
+"""Name of the window of the whole settled part of a run, by direction."""
 GOLDEN = 0.5 * (1.0 + math.sqrt(5.0))
-"""Ratio whose multiples spread starts most evenly."""
+"""Golden ratio: its multiples spread starts most evenly."""
 MEMORIES = 7.0
-"""lengths of friction's memory, Ts / sigma0, after which a reversal is over: 2 exp(-7) is 0.2 %."""
+"""Settling angle over friction's memory, Ts / sigma0: 2 exp(-7), 0.2 % of a reversal, is left."""
 
 ROUNDING = 1e-9
-"""of an angle, by which a difference of times may fall short of it."""
+"""Relative rounding error of an angle from a difference of times."""
 
 
 class VelocityMapOptions(Options):
@@ -94,15 +93,15 @@ class VelocityMapOptions(Options):
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Runs that begin at one angle are archived as before there was another way."""
+        """Omit `spread_starts` if it is off, as in archives from before it existed."""
         tree: dict[str, Any] = dump(self)
         if not self.spread_starts:
             tree.pop("spread_starts", None)
         return tree
 
     def without_effect(self) -> frozenset[str]:
-        found = {"slowest", "fastest", "points"} if self.speeds else set()
-        return frozenset(found | (set() if self.warm_up_cycles else {"warm_up_speed"}))
+        unused = {"slowest", "fastest", "points"} if self.speeds else set()
+        return frozenset(unused | (set() if self.warm_up_cycles else {"warm_up_speed"}))
 
 
 def map_speeds(options: VelocityMapOptions) -> tuple[float, ...]:
@@ -111,7 +110,7 @@ def map_speeds(options: VelocityMapOptions) -> tuple[float, ...]:
         if min(options.speeds) <= 0:
             raise ValueError("speeds are positive; each is run in both directions")
         return options.speeds
-    # In round numbers, as they are written: the last bits are those of a list.
+    # Round numbers, as they are written: the last bits equal those of a list.
     unit = 1e-3 if is_linear() else float(np.deg2rad(1.0))
     low, high = (round(v / unit, 12) for v in (options.slowest, options.fastest))
     if high < low:
@@ -124,10 +123,10 @@ class Run:
     """Times of one out-and-back trial (s), from the trial's start.
 
     Attributes:
-        ramp, cruise: length of one ramp, and of the constant speed between two.
-        window: length of the settled window, at the end of each cruise.
-        rule: what set the window's length.
-        settle: what is left out at the beginning of each cruise.
+        ramp, cruise: durations of one ramp, and of the constant speed between two ramps.
+        window: duration of the settled window, at the end of each cruise.
+        rule: what set the window's duration.
+        settle: duration at the beginning of each cruise that is left out.
     """
 
     speed: float
@@ -140,7 +139,7 @@ class Run:
 
     @property
     def settled(self) -> float:
-        """How long the speed is held once it has settled."""
+        """Duration of the constant speed after settling (s)."""
         return self.cruise - self.settle
 
     @property
@@ -153,14 +152,14 @@ class Run:
         return stop - self.window, stop
 
     def windows(self) -> tuple[Window, ...]:
-        """The averaged part of each direction, and all of it that is settled."""
-        found = []
+        """Averaged window and whole settled window of each direction."""
+        windows = []
         for name, direction in DIRECTIONS.items():
             start, stop = self.window_of(direction)
-            found.append(Window(name, start, stop))
+            windows.append(Window(name, start, stop))
             begin = stop - self.cruise + self.settle
-            found.append(Window(WHOLE.format(name), min(begin, start), stop))
-        return tuple(found)
+            windows.append(Window(WHOLE.format(name), min(begin, start), stop))
+        return tuple(windows)
 
     def command(self) -> Polyline:
         """The rate command: rest, out, rest, back, rest."""
@@ -181,14 +180,14 @@ REQUIRED = {
     GYRO_RATE: "the rate of each point",
     DRIVE_TORQUE: "the friction torque of each point",
 }
-"""Channels of a map, whatever is made of it."""
+"""Channels that every map needs."""
 OWN = ("speed", "start_angle")
-"""What tells the trials of one map apart; whatever else is swept makes another map."""
+"""Point keys that differ between trials of one map. Any other swept key makes another map."""
 CAN_USE = {RELATIVE_ANGLE: "look for a ripple of friction over position"}
 
 
 def windows_of(trial: Trial) -> dict[str, Window]:
-    """Windows of a trial by name; an archive of a program that named none is planned again."""
+    """Windows of a trial by name, planned again for archives that have none."""
     windows = trial.windows or _replanned(trial).windows()
     return {window.name: window for window in windows}
 
@@ -198,12 +197,12 @@ def rule_of(trial: Trial) -> str:
     if trial.task.mode == "recorded":
         return "found in the recording"
     run, own = _replanned(trial), windows_of(trial)["positive"]
-    # Runs of a pilot, and those that follow it, have other windows than the options tell.
+    # Windows of a pilot's runs, and of runs that follow it, differ from those of the options.
     return run.rule if math.isclose(own.stop - own.start, run.window) else "the pilot"
 
 
 def settled_angle(trial: Trial) -> float:
-    """Angle (rad) that a run moves at constant speed before what counts as settled."""
+    """Angle (rad) that a run moves at constant speed before its settled part."""
     run, whole = _replanned(trial), windows_of(trial).get(WHOLE.format("positive"))
     settle = run.settle if whole is None else run.cruise - (whole.stop - whole.start)
     return settle * run.speed
@@ -220,11 +219,11 @@ def _replanned(trial: Trial) -> Run:
 
 
 def settling_advice(rig: Rig, speed: float, settled: float) -> str:
-    """What to do when a run at `speed` (rad/s) settles for too short an angle (rad); empty when it
-    does not.
+    """Advice for a run at `speed` (rad/s) that settles for too short an angle (rad); empty if it is
+    long enough.
     """
     memory, turned = rig.presliding or 0.0, rig.unwinding(speed)
-    turned = turned if turned > memory else 0.0  # less is over while friction forgets
+    turned = turned if turned > memory else 0.0  # a shorter reversal ends within friction's memory
     needed = MEMORIES * memory + turned
     if settled >= needed * (1.0 - ROUNDING):
         return ""
@@ -234,7 +233,7 @@ def settling_advice(rig: Rig, speed: float, settled: float) -> str:
 
 
 def plan_run(speed: float, options: VelocityMapOptions) -> Run:
-    """The run at `speed` (rad/s). ValueError when it cannot settle within the travel allowed."""
+    """Plan the run at `speed` (rad/s). ValueError if it cannot settle within the allowed travel."""
     ramp = speed / options.acceleration
     by_travel = options.max_travel / speed - ramp
     by_time = options.max_time - 2 * ramp
@@ -258,11 +257,11 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
 
 
 def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
-    """What to do where runs of a map settle for too short an angle, once for each bench."""
+    """Advice for maps whose runs settle for too short an angle, one note per bench."""
     runs: dict[str, list[tuple[float, float]]] = {}
     rigs: dict[str, Rig] = {}
     for trial in trials:
-        if trial.task.mode == "recorded":  # nobody here decided how long it settled
+        if trial.task.mode == "recorded":  # its settling was not planned
             continue
         key = canonical_json(trial.bench)
         rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
@@ -274,24 +273,24 @@ def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
 
 
 def settling_of_runs(rig: Rig, runs: Iterable[tuple[float, float]]) -> tuple[str, str]:
-    """At which speeds runs settle for too short an angle, and the advice for the slowest of them.
+    """Speeds at which runs settle for too short an angle, and the advice for the slowest of them.
 
     Args:
         runs: speed (rad/s) and settled angle (rad) of each.
     """
-    told = {speed: settling_advice(rig, speed, settled) for speed, settled in runs}
-    short = sorted(speed for speed, advice in told.items() if advice)
-    return (speed_range(short), told[short[0]]) if short else ("", "")
+    advices = {speed: settling_advice(rig, speed, settled) for speed, settled in runs}
+    short = sorted(speed for speed, advice in advices.items() if advice)
+    return (speed_range(short), advices[short[0]]) if short else ("", "")
 
 
 def speed_range(speeds: Sequence[float]) -> str:
-    """From the slowest to the fastest (rad/s), in words."""
+    """Range of speeds (rad/s), in words."""
     low, high = rate_text(min(speeds)), rate_text(max(speeds))
     return high if low == high else f"{low.split()[0]} to {high}"
 
 
 def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialRequest]:
-    """The warm-up, then one trial out and back for each speed and each angle to start from."""
+    """Requests of the warm-up, then of one trial out and back per speed and start angle."""
     yield from warm_ups(options)
     rig = Rig(bench)
     for number, speed in enumerate(map_speeds(options)):
@@ -301,9 +300,9 @@ def map_trials(options: VelocityMapOptions, bench: Bench) -> Iterator[TrialReque
 def run_requests(
     run: Run, options: VelocityMapOptions, rig: Rig, number: int
 ) -> Iterator[TrialRequest]:
-    """A trial of the run for each angle to start from. ValueError for too few samples.
+    """Trials of the run, one per start angle. Raises ValueError for too few samples.
 
-    number: of the run in its map, from 0.
+    number: index of the run in its map, from 0.
     """
     if run.window * options.sample_rate < SMALLEST_WINDOW:
         raise ValueError(
@@ -311,7 +310,7 @@ def run_requests(
             f"than {SMALLEST_WINDOW} samples; raise sample_rate or drop that speed"
         )
     (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
-    told = f"window {run.window:.3g} s, {angle_text(run.window * run.speed)}: {run.rule}"
+    window_text = f"window {run.window:.3g} s, {angle_text(run.window * run.speed)}: {run.rule}"
     advice = settling_advice(rig, run.speed, run.speed * run.settle)
     many = bool(options.start_angles)
     for start_angle in _starts(options, run, number, rig.limits.angle):
@@ -326,7 +325,7 @@ def run_requests(
                 start_angle=start_angle,
             ),
             point={"speed": run.speed} | ({"start_angle": start_angle} if many else {}),
-            note=f"{told}; {advice}" if advice else told,
+            note=f"{window_text}; {advice}" if advice else window_text,
             windows=run.windows(),
         )
 
@@ -334,10 +333,10 @@ def run_requests(
 def _starts(
     options: VelocityMapOptions, run: Run | None = None, number: int = 0, limit: float = 0.0
 ) -> tuple[float, ...]:
-    """Angles to start from (rad): of the warm-up, or of a run on an axis with that limit.
+    """Start angles (rad) of the warm-up, or of a run on an axis with that limit.
 
-    Starts are spread over half of what the limits leave, a quarter of a turn where there are none:
-    over the way of the fastest run alone, all fast runs would see a long ripple at one place.
+    Starts spread over half of the angle between the limits, or a quarter turn without limits. Over
+    the travel of the fastest run alone, all fast runs would see a long ripple at one place.
     """
     lowest = -0.5 * options.max_travel
     if options.start_angles or run is None or not options.spread_starts:
@@ -348,7 +347,7 @@ def _starts(
 
 
 def warm_ups(options: VelocityMapOptions) -> Iterator[TrialRequest]:
-    """The warm-up, where one is wanted."""
+    """Request of the warm-up, if one is wanted."""
     if options.warm_up_cycles:
         yield _warm_up(options, _starts(options)[0])
 
@@ -379,23 +378,23 @@ def _warm_up(options: VelocityMapOptions, start_angle: float) -> TrialRequest:
 def stretches_found(
     options: Any, bench: Bench, offered: OfferedRecording
 ) -> Iterator[TrialRequest]:
-    """A trial for each steady stretch, of one direction; or the windows that somebody has named.
+    """One trial per steady stretch, of one direction; or one trial of the windows that are named.
 
-    Raises ValueError where there is none.
+    Raises ValueError without a steady stretch.
     """
     if offered.windows:
         yield from _named(offered)
         return
     recording = offered.read([GYRO_RATE, DRIVE_TORQUE])
     torque = recording[DRIVE_TORQUE]
-    found = [
+    stretches = [
         each
         for each in steady_stretches(recording[GYRO_RATE], offered.sample_rate, torque)
         if each.stop - each.first >= SMALLEST_WINDOW
     ]
-    if not found:
+    if not stretches:
         raise ValueError("nowhere does the load slide steadily; say its windows, or how fast it is")
-    for stretch in found:
+    for stretch in stretches:
         start, stop = stretch.first / offered.sample_rate, stretch.stop / offered.sample_rate
         name = "positive" if stretch.rate > 0 else "negative"
         yield _request(
@@ -427,7 +426,7 @@ def _request(speed: float, windows: tuple[Window, ...], part: tuple[float, float
             mode="recorded",
             duration=part[1] - part[0],
             window=(windows[0].start, windows[0].stop),
-            sample_rate=1.0,  # the recording's own, once it is known which part of it this is
+            sample_rate=1.0,  # replaced by the recording's own, once its part is known
         ),
         point={"speed": speed},
         note="found in the recording",

@@ -1,9 +1,8 @@
 """Friction over rate from the steady stretches of recordings without a map.
 
-Of more than six speeds, a Stribeck curve is fitted to each direction; of fewer, a straight line; of
-one there is the friction at it. Static friction that lies below Coulomb friction is as welcome as
-any other. Where the normal load was recorded, the same is said of the friction coefficient; of it
-alone where loads differ.
+With more than six speeds, a Stribeck curve is fitted to each direction; with fewer, a straight
+line; with one there is the friction at it. Static friction may lie below Coulomb friction. With a
+recorded normal load the friction coefficient is fitted, too; if loads differ, only the coefficient.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ from campaign.reason import Cause, Reason
 from campaign.units import angle_text, torque_text
 
 SHOWN = 8
-"""Numbers of trials that a reason lists."""
+"""Most trial numbers that a reason lists."""
 NO_STRETCH = Cause(
     "no steady stretch",
     "{count} of {total} trials ({numbers}) have no steady stretch, and are not in the map",
@@ -60,19 +59,19 @@ ADVICE = {
     "friction": "slide at several speeds, further apart",
 }
 KEYS = {*ADVICE} - {"friction"}
-"""Numbers that a bench has a place for."""
+"""Numbers with a key in a bench file."""
 
 
 @dataclass(frozen=True)
 class SteadyResult:
-    """What steady stretches show.
+    """Result of steady stretches.
 
     Attributes:
-        first: one of the trials, which says how well torque and load are known.
-        points, left: stretches that are in the map, and those that are not steady.
-        maps: friction over rate, and its coefficient; empty where stretches show neither.
-        parameters: of all maps; in SI.
-        left_out: trials and stretches, one reason for each kind.
+        first: one of the trials, which states the uncertainty of torque and load.
+        points, left: stretches in the map, and stretches that are not steady.
+        maps: friction over rate, and its coefficient; empty if stretches show neither.
+        parameters: parameters of all maps, in SI.
+        left_out: trials and stretches left out, one reason per kind.
     """
 
     first: TrialData
@@ -91,20 +90,20 @@ class SteadyResult:
 
 def by_direction(parameters: Iterable[Parameter]) -> dict[str, dict[str, Estimate]]:
     """Parameters of both directions, e.g. `coulomb_torque_positive`, by direction and then name."""
-    told: dict[str, dict[str, Estimate]] = {}
+    parts: dict[str, dict[str, Estimate]] = {}
     for each in parameters:
-        name, _, way = each.estimate.name.rpartition("_")
-        told.setdefault(way, {})[name] = replace(each.estimate, name=name)
-    return told
+        name, _, direction = each.estimate.name.rpartition("_")
+        parts.setdefault(direction, {})[name] = replace(each.estimate, name=name)
+    return parts
 
 
 def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> SteadyResult:
-    """Of all trials together, which are of one bench."""
+    """Steady sliding of all trials of one bench together."""
     first = trials[0]
-    found, held = points_of(trials, options.shortest, options.slowest)
-    points = tuple(point for point in found if not point.unsteady)
-    left = tuple(point for point in found if point.unsteady)
-    lost = tuple(_left_out(trials, options, found))
+    every, held = points_of(trials, options.shortest, options.slowest)
+    points = tuple(point for point in every if not point.unsteady)
+    left = tuple(point for point in every if point.unsteady)
+    lost = tuple(_left_out(trials, options, every))
     if not points:
         return SteadyResult(first, points, left, left_out=lost)
     notes = [] if held is None else [_over_a_turn(held)]
@@ -126,8 +125,8 @@ def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> SteadyRe
             "`sign = -1` reverses it."
         )
     parameters = tuple(each for one in maps for each in parameters_of(one, maps[0]))
-    told = tuple(dict.fromkeys(notes))
-    return SteadyResult(first, points, left, maps, parameters, told, lost)
+    distinct = tuple(dict.fromkeys(notes))
+    return SteadyResult(first, points, left, maps, parameters, distinct, lost)
 
 
 def _left_out(
@@ -149,11 +148,11 @@ def _left_out(
 
 
 def _over_a_turn(held: OverATurn) -> str:
-    """Of a torque that follows from the angle, in words."""
+    """Note on a torque that depends on the angle."""
     often = zip(held.amplitudes, ("once", "twice"), strict=False)
-    told = " and ".join(f"by {torque_text(amplitude)} {times}" for amplitude, times in often)
+    sizes = " and ".join(f"by {torque_text(amplitude)} {times}" for amplitude, times in often)
     return (
-        f"Within steady stretches the torque changes with the angle, as gravity does: {told} over "
+        f"Within steady stretches the torque changes with the angle, as gravity does: {sizes} over "
         f"{angle_text(math.tau, '.4g')}, which is {100 * held.share:.3g} % of all that changes "
         "there. It is no friction and was taken off; its uncertainty is the part `angle` of what "
         "was found."
@@ -161,32 +160,32 @@ def _over_a_turn(held: OverATurn) -> str:
 
 
 def parameters_of(curves: Curves, first: Curves | None = None) -> Iterator[Parameter]:
-    """Parameters of both directions, e.g. `coulomb_torque_positive`, with their places in a bench.
+    """Parameters of both directions, e.g. `coulomb_torque_positive`, with their keys in a bench.
 
     first: curves of another quantity and the same points, which have their Stribeck velocity.
     """
     quantity = curves.quantity
     largest = max(abs(curves.read(point).value) for point in curves.points)
     fastest = max(abs(point.speed) for point in curves.points)
-    places, found = {}, {}
+    places, estimates_by_key = {}, {}
     matters: dict[str, float] = {}
-    for way, estimates in curves.found.items():
+    for direction, estimates in curves.found.items():
         for name, one in estimates.items():
             shape = name.startswith("stribeck")
             if shape and first not in (None, curves):
                 continue
-            key = f"{quantity.called(name)}_{way}"
-            places[key] = name, way
-            found[key] = replace(one, name=key, unit=quantity.meanings[name][0])
+            key = f"{quantity.called(name)}_{direction}"
+            places[key] = name, direction
+            estimates_by_key[key] = replace(one, name=key, unit=quantity.meanings[name][0])
             matters |= {} if shape else {key: mattering(name, largest, fastest)}
-    told = admitted_together(found, matters)
+    admitted = admitted_together(estimates_by_key, matters)
     for name in ("coulomb_torque", "static_torque"):
-        told = with_offset(told, quantity.called(name))
-    dry = [told.get(f"coulomb_torque_{way}") for way in DIRECTIONS]
+        admitted = with_offset(admitted, quantity.called(name))
+    dry = [admitted.get(f"coulomb_torque_{direction}") for direction in DIRECTIONS]
     both = all(one is not None and is_value(one) for one in dry)
-    for key, (name, way) in places.items():
-        prefix = "negative." if way == "negative" else ""
-        goes = quantity is FRICTION and name in KEYS and both
-        place = f"friction.load.{prefix}{name}" if goes else ""
-        meaning = f"{quantity.meanings[name][1]}, {way} direction."
-        yield Parameter(told[key], meaning, "", place, ADVICE[name])
+    for key, (name, direction) in places.items():
+        prefix = "negative." if direction == "negative" else ""
+        has_key = quantity is FRICTION and name in KEYS and both
+        place = f"friction.load.{prefix}{name}" if has_key else ""
+        meaning = f"{quantity.meanings[name][1]}, {direction} direction."
+        yield Parameter(admitted[key], meaning, "", place, ADVICE[name])

@@ -1,6 +1,6 @@
-"""Steady stretches of trials, with the normal load where it is known.
+"""Steady stretches of trials, with the normal load if it is known.
 
-Of a tribometer friction means little without its normal load: over it, it is a coefficient.
+Friction of a tribometer means little without its normal load. Their ratio is a coefficient.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from campaign.result import Array
 from campaign.units import AngularRate, Time
 
 ANY_NAME = "motion"
-"""Kind of trials whose windows are stretches whatever their names."""
+"""Kind of trials whose windows are stretches with any name."""
 FEWEST = 20
-"""samples of a stretch that are not lost."""
+"""Fewest valid samples of a stretch."""
 LOADS_ALIKE = 1.05
-"""Largest over smallest normal load up to which all stretches had one."""
+"""Largest over smallest normal load up to which all stretches have one load."""
 
 
 class StretchOptions(Options):
@@ -48,13 +48,13 @@ class StretchOptions(Options):
 
 
 def force_of(data: TrialData) -> str:
-    """The channel that friction is read from: the joint's own, or else the drive's."""
+    """Channel of the friction: the joint torque, or else the drive torque."""
     return JOINT_TORQUE if JOINT_TORQUE in data.channel_names() else DRIVE_TORQUE
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples of a steady stretch, shape (n,) each; `angle` (rad) None where nobody recorded it."""
+    """Valid samples of a steady stretch, shape (n,) each; `angle` (rad) None if not recorded."""
 
     data: TrialData
     time: Array
@@ -64,16 +64,16 @@ class Stretch:
     normal_load: float
 
     def point(self, held: OverATurn | None) -> Point:
-        """What it comes to, without what follows from the angle."""
+        """Point of the stretch, without the torque that depends on the angle."""
         torque, angle, doubts = self.torque, self.angle, ()
         if angle is not None and held is not None:
             torque, doubts = torque - held.at(angle), tuple(held.doubts(angle))
         if angle is not None:
             angle = np.unwrap(angle)
         trial, bench, force = self.data.trial, bench_of(self.data.trial), force_of(self.data)
-        # A sensor in the joint is not told what accelerates the load.
+        # A joint torque sensor does not measure the torque that accelerates the load.
         inertia = 0.0 if force == JOINT_TORQUE else bench.axis.inertia
-        # A rate relative to the hull may be made of an encoder's counts.
+        # A rate relative to the hull may be computed from encoder counts.
         own = steady_sliding(self.time, self.rate, torque, angle, inertia, own_sensor=False)
         moved = (inertia or 0.0) * own.acceleration
         radius = trial.options.get("radius")
@@ -93,24 +93,25 @@ class Stretch:
 def points_of(
     trials: Sequence[TrialData], shortest: float, slowest: float | None = None
 ) -> tuple[list[Point], OverATurn | None]:
-    """Of all steady stretches, and what of their torque follows from the angle, and is not in them.
+    """Points of all steady stretches without the torque that depends on the angle, and that torque.
 
     Args:
         trials: of one bench.
-        shortest: stretch (s) that is looked for, where a trial names no windows.
+        shortest: shortest stretch (s), in trials without named windows.
         slowest: rate (SI) up to which the axis stands still; None: 3 % of its fastest.
     """
-    found, held = _found(trials, shortest, slowest, None)
+    stretches, held = _found(trials, shortest, slowest, None)
     if held is not None:  # without it the torque is steady for longer
-        found, held = _found(trials, shortest, slowest, held)
-    points = [each.point(held) for each in found]
+        stretches, held = _found(trials, shortest, slowest, held)
+    points = [each.point(held) for each in stretches]
     return [each for each in points if each.rate.value != 0.0], held
 
 
 def slower(trials: Sequence[TrialData], shortest: float, found: Sequence[Point]) -> int:
-    """How many steady stretches count as standstill, slower than all that were found there.
+    """Number of steady stretches that count as standstill, below half the slowest rate in their
+    trial.
 
-    found: the points of all trials, with no `slowest` stated.
+    found: points of all trials, with no `slowest` stated.
     """
     count = 0
     for trial in trials:
@@ -124,17 +125,17 @@ def slower(trials: Sequence[TrialData], shortest: float, found: Sequence[Point])
 def _found(
     trials: Sequence[TrialData], shortest: float, slowest: float | None, held: OverATurn | None
 ) -> tuple[list[Stretch], OverATurn | None]:
-    """Stretches in which what `held` leaves is steady, and what follows from the angle there."""
-    found = [stretch for trial in trials for stretch in _stretches(trial, shortest, slowest, held)]
-    placed = [(each.time, each.angle, each.torque) for each in found if each.angle is not None]
-    whole = len(placed) == len(found) and not bench_of(trials[0].trial).is_linear
-    return found, over_a_turn(placed) if whole else None
+    """Stretches of steady torque less that of `held`, and their torque that depends on angle."""
+    parts = [stretch for trial in trials for stretch in _stretches(trial, shortest, slowest, held)]
+    placed = [(each.time, each.angle, each.torque) for each in parts if each.angle is not None]
+    whole = len(placed) == len(parts) and not bench_of(trials[0].trial).is_linear
+    return parts, over_a_turn(placed) if whole else None
 
 
 def _stretches(
     data: TrialData, shortest: float, slowest: float | None, held: OverATurn | None
 ) -> Iterator[Stretch]:
-    """Of the windows that somebody named, or of what is steady."""
+    """Stretches of the named windows, or else of the steady samples."""
     recording, trial = data.recording(), data.trial
     torque, rate = recording[force_of(data)], recording[RELATIVE_RATE]
     load = recording[NORMAL_LOAD] if NORMAL_LOAD in recording.channels else None
@@ -151,16 +152,16 @@ def _stretches(
         good = np.isfinite(rate[first:stop] + torque[first:stop])
         if angle is not None:
             good &= np.isfinite(angle[first:stop])
-        there = np.flatnonzero(good) + first
-        if len(there) < FEWEST:
+        valid = np.flatnonzero(good) + first
+        if len(valid) < FEWEST:
             continue
         yield Stretch(
             data,
-            recording.time[there],
-            rate[there],
-            torque[there],
-            None if angle is None else angle[there],
-            math.nan if load is None else float(np.nanmean(load[there])),
+            recording.time[valid],
+            rate[valid],
+            torque[valid],
+            None if angle is None else angle[valid],
+            math.nan if load is None else float(np.nanmean(load[valid])),
         )
 
 
@@ -170,12 +171,12 @@ def loaded(points: Sequence[Point]) -> bool:
 
 
 def loads_alike(points: Sequence[Point]) -> bool:
-    """Whether friction of all stretches belongs to one normal load, as far as anybody knows."""
+    """Whether the known normal loads of all stretches are one load."""
     known = [each.load for each in points if math.isfinite(each.load)]
     return not known or max(known) <= LOADS_ALIKE * min(known)
 
 
 def drives_motion(points: Sequence[Point]) -> bool:
-    """Whether what is called friction drives the motion, nearly wherever it slides."""
+    """Whether the friction acts with the motion at nearly all points."""
     power = np.array([each.torque.value * each.sign for each in points])
     return bool(np.median(power) < 0 and np.mean(power < 0) > 0.9)

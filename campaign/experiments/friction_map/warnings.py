@@ -1,6 +1,6 @@
 """Warnings of the plan of a friction-velocity map.
 
-Only of what the bench describes: where friction is not described nothing is warned of.
+Except for the number of speeds they depend on the bench: without its friction there are none.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from campaign.physics.true_values import stribeck_parameters
 from campaign.units import angle_text, rate_text
 
 LEAST_RUNS = 2
-"""that have to show a ripple whose period is known, for it to be taken out of all points."""
+"""Fewest runs that show a ripple of known period, for its removal from all points."""
 
 
 def map_warnings(options: VelocityMapOptions, bench: Bench) -> Iterator[str]:
-    """Sentences, without a full stop, of a map that was planned with these options."""
+    """Warnings, without a full stop, on a map planned with these options."""
     runs = [plan_run(speed, options) for speed in sorted(set(map_speeds(options)))]
     yield from _too_few(runs)
-    if getattr(options, "pilot", False):  # it decides where others run, and how long they settle
+    if getattr(options, "pilot", False):  # it decides speeds and settling of the other runs
         return
     yield from _extrapolated(runs, bench)
     yield from _settling(runs, bench)
@@ -48,7 +48,7 @@ def _too_few(runs: Sequence[Run]) -> Iterator[str]:
 
 
 def _extrapolated(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
-    """Below the larger Stribeck velocity, where the directions have two, and far above it."""
+    """Warn of few speeds below the larger of two Stribeck velocities, and of none far above it."""
     known = [stribeck_parameters(bench, sign) for sign in (1.0, -1.0)]
     velocity = max(each.get("stribeck_velocity", 0.0) for each in known)
     below = sum(run.speed < velocity for run in runs)
@@ -73,8 +73,8 @@ def _settling(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
 
 
 def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> Iterator[str]:
-    """Of a ripple that windows do not average, several starts neither, and the analysis cannot
-    take out, for too few runs are long and slow enough to show it.
+    """Warn of a ripple that windows and starts do not average, and that the analysis cannot remove:
+    too few runs are long and slow enough to show it.
     """
     period = Rig(bench).ripple_period
     if period is None or len(set(options.start_angles)) > 1:
@@ -84,15 +84,15 @@ def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> I
     showing = [run for run in slow if run.settled * run.speed >= LEAST_PERIODS * period]
     if not short or len(showing) >= LEAST_RUNS:
         return
-    told = f"a period of friction's ripple, {angle_text(period)}"
+    span = f"a period of friction's ripple, {angle_text(period)}"
     if options.max_travel < period and not options.spread_starts:
         yield (
-            f"max_travel of {angle_text(options.max_travel)} is shorter than {told}: every run "
+            f"max_travel of {angle_text(options.max_travel)} is shorter than {span}: every run "
             "sees it at one place; raise it, or write two start_angles half a period apart"
         )
         return
     yield (
-        f"at {speed_range(short)} windows are shorter than {told}, and it cannot be taken out: of "
+        f"at {speed_range(short)} windows are shorter than {span}, and it cannot be taken out: of "
         f"the runs below {rate_text(FASTEST * period)} {len(showing)} span one, and {LEAST_RUNS} "
         "have to; raise max_travel or max_time, or write two start_angles half a period apart"
     )

@@ -1,8 +1,8 @@
 """Output of friction models at a sinusoidal rate, without a plant (Figures 4.10, 4.14).
 
-The load is moved exactly as prescribed, so nothing but the model decides the torque. The friction
-of the bench can be described by several models, its compensators run on the same rate, and each
-parameter can be varied (Figures 5.12 and 5.13).
+The load moves exactly as prescribed, so only the model determines the torque. Several models can
+describe the friction of the bench, its compensators get the same rate, and each parameter can be
+varied (Figures 5.12 and 5.13).
 """
 
 from __future__ import annotations
@@ -60,11 +60,11 @@ OWN = ("model", "compensation")
 VARIED = ("parameter", "factor")
 METRICS = ("peak", "at_amplitude", "at_reversal")
 JUMP = 20.0
-"""times the step of the torque from sample to sample beside it."""
+"""Ratio of a torque step to the median step around it, above which it is a jump."""
 NO_REVERSAL = Cause("no reversal", "the rate does not fall through zero, or {why}")
 JUMPS = Cause("torque that jumps", "the torque jumps where the rate changes its sign")
 CYCLES = 2
-"""of the prescribed rate; the first brings the bristles into their cycle, the last is shown."""
+"""of the prescribed rate; in the first one the bristles settle, the last one is shown."""
 
 
 class ModelOutputOptions(Options):
@@ -144,8 +144,8 @@ def _analyse(data: TestData) -> Result:
     varied = places((item for item in measured if "parameter" in item.trial.point), VARIED)
     for place in (*plain, *varied):
         for repeats in grouped(place.trials).values():
-            found = combined(repeats, _measure)
-            row = {name: found.get(f"model_{name}") or _not_found(name) for name in METRICS}
+            combination = combined(repeats, _measure)
+            row = {name: combination.get(f"model_{name}") or _not_found(name) for name in METRICS}
             rows.append({**place.point, "source": source(repeats[0]), **row})
             findings += [
                 Finding.of(row[name], conditions(repeats[0])) for name in ("peak", "at_reversal")
@@ -185,17 +185,17 @@ def _analyse(data: TestData) -> Result:
 
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
-    """Torque of the last cycle: the largest, at the largest rate, and where the rate reverses.
+    """Torque of the last cycle: the largest, at the largest rate, and at the reversal of the rate.
 
-    Without what cannot be told because samples of the rate were lost (NaN).
+    Without the last two if samples of the rate were lost (NaN).
     """
     cut, torque = cycle(data)
     rate = cut[LOAD_RATE]
-    found = [peak("peak", torque, "N m")]
+    metrics = [peak("peak", torque, "N m")]
     if np.all(np.isfinite(rate)):
-        found.append(at_sample("at_amplitude", torque, int(np.argmax(rate)), "N m"))
-        found += _at_reversal(rate, torque)
-    return simulated(named(each, f"model_{each.name}") for each in found)
+        metrics.append(at_sample("at_amplitude", torque, int(np.argmax(rate)), "N m"))
+        metrics += _at_reversal(rate, torque)
+    return simulated(named(each, f"model_{each.name}") for each in metrics)
 
 
 def _not_found(name: str) -> Estimate:
@@ -206,7 +206,7 @@ def _not_found(name: str) -> Estimate:
 def _at_reversal(rate: Array, torque: Array) -> Iterator[Estimate]:
     """Torque (N m) where the rate falls through zero: between two samples, unless it jumps there.
 
-    A jump is a step between neighbours that is far larger than those beside it.
+    A jump is a step of more than `JUMP` times the median of the steps around it.
     """
     falling = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0))
     if not len(falling):
@@ -219,7 +219,7 @@ def _at_reversal(rate: Array, torque: Array) -> Iterator[Estimate]:
         return
     steps = np.abs(np.diff(near))
     if np.max(steps) > JUMP * np.median(steps):
-        # A sine's zero is not quite zero, and a jump goes through it.
+        # A sampled sine is not exactly zero there, and a jump passes through zero.
         middle = 0.0 if abs(value) < 1e-9 * float(np.nanmax(torque)) else value
         yield Estimate.without_interval("at_reversal", middle, "N m", JUMPS())
         return

@@ -20,22 +20,22 @@ TORQUE = Axis("Friction torque", "N m", "N m")
 LEFT = Axis("Friction less compensation", "N m", "N m")
 WHAT_IS_LEFT = "What compensation leaves is the friction of the bench less the output of its model."
 NEAR_ZERO = 0.08
-"""Share of the amplitude that is shown around zero rate."""
+"""Shown share of the amplitude around zero rate."""
 
 
 def shown_torque(compensation: str) -> str:
-    """The channel that a trial is about: of friction or of compensation."""
+    """The torque channel of a trial: of friction or of compensation."""
     return FRICTION_TORQUE if compensation == "none" else COMPENSATION_TORQUE
 
 
 def cycle(data: TrialData) -> tuple[Recording, Array]:
-    """The last cycle, and the torque that this trial is about."""
+    """The last cycle of a trial, and its torque."""
     cut = data.recording().window(*data.trial.task.window)
     return cut, cut[shown_torque(data.trial.task.compensation)]
 
 
 def source(data: TrialData) -> str:
-    """Whose output a trial shows: a model, a compensation, a varied parameter."""
+    """Label of a trial's output: a model, a compensation or a varied parameter."""
     point = data.trial.point
     if "compensation" in point:
         return f"{method_label(str(point['compensation']))} (compensation)"
@@ -113,7 +113,7 @@ def sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
 
 
 def _left(trials: Sequence[TrialData]) -> list[Curve]:
-    """Friction less each compensation at the same rate; nothing of several frictions."""
+    """Friction less each compensation at the same rate; empty for several friction models."""
     plain = [item for item in trials if "compensation" not in item.trial.point]
     if len(plain) != 1:
         return []
@@ -135,7 +135,7 @@ def _closed(rate: Array, torque: Array) -> tuple[Array, Array]:
 
 
 def _largest(rate: Array) -> float:
-    """The largest of the samples that were not lost; 1 rad/s where all were."""
+    """The largest of the samples that were not lost; 1 rad/s if all were lost."""
     known = rate[np.isfinite(rate)]
     return float(np.max(known)) if len(known) else 1.0
 
@@ -143,7 +143,7 @@ def _largest(rate: Array) -> float:
 def _near(curve: Curve, rate: float) -> Curve:
     """The parts of a curve at rates up to twice `rate`, with gaps between them.
 
-    A drawing shows so many points of a curve: this way it shows them where it looks.
+    A drawing shows a limited number of points of a curve; all of them are near zero rate then.
     """
     inside = np.flatnonzero(np.abs(curve.x) <= 2.0 * rate)
     parts = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)

@@ -1,1 +1,1 @@
-"""Which properties of friction a model has: Table 3.1, from virtual experiments."""
+"""Properties of friction models: Table 3.1, from virtual experiments."""

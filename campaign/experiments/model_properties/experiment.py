@@ -1,8 +1,8 @@
-"""Which properties of friction each model has: Table 3.1 of the thesis, measured.
+"""Properties of friction models: Table 3.1 of the thesis, from virtual experiments.
 
-Each model is described by each parameter set, without parameters that the equations of its source
-lack. Virtual experiments give numbers, and `rules` make marks of them. A mark holds for all sets,
-or the property depends on the parameters.
+Each model gets each parameter set, without parameters that the equations of its source lack.
+Virtual experiments give numbers; `rules` turn them into marks. A mark holds for all sets, or the
+property depends on the parameters.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from campaign.result import Finding, Result
 from campaign.trial import TrialRequest, canonical_json
 
 STEP = 1e-4
-"""s, for the states of models that keep some of their past."""
+"""s; time step that sets the state size of models with a stored history."""
 OWN = ("set", "model", "part", "torque_rate", "speed", "frequency", "rest")
 RULED = Cause("by a rule", "a mark by a rule")
 
@@ -83,7 +83,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
 
 
 def _sizes(model: str, given: Any) -> dict[str, int | None]:
-    """How many of a set's parameters a model takes; its numbers of state and switch functions."""
+    """Numbers of parameters that a model takes from a set, of its state and switch functions."""
     options, kind = options_of(model, given, own=True), friction_models()[model]
     return {
         "parameters": len(options.model_fields_set - {"model"}),
@@ -97,7 +97,7 @@ def _options(data: TestData) -> ModelPropertiesOptions:
 
 
 def _judged(data: TestData, notes: list[str]) -> Iterator[ModelVerdict]:
-    """Each model whose trials are all there."""
+    """Verdicts of the models whose trials are complete; notes on the others."""
     options = _options(data)
     done = list(data.completed())
     if len(places(done, OWN)) > 1:
@@ -114,9 +114,9 @@ def _judged(data: TestData, notes: list[str]) -> Iterator[ModelVerdict]:
             if not own or len(points) < _number_of_trials(own[0]):
                 notes.append(f"{model}, {name}: trials are missing; the model is left out.")
                 break
-            found = [(each.trial.point, metrics(each, _measure)) for each in own]
+            measured = [(each.trial.point, metrics(each, _measure)) for each in own]
             try:
-                numbers[name] = numbers_of(found, _scale(own[0]))
+                numbers[name] = numbers_of(measured, _scale(own[0]))
             except ValueError as error:
                 notes.append(f"{model}, {name}: {error}; the model is left out.")
                 break
@@ -138,19 +138,19 @@ def _findings(judged: ModelVerdict) -> Iterator[Finding]:
     count = Estimate("model_parameters", parameters, "", kind="count", reason=COUNTED())
     yield Finding.of(count, conditions)
     met = sum(judged.sign(rule) == MARKS[MET] for rule in RULES)
-    told = Estimate("properties_met", met, "", kind="count", reason=COUNTED())
-    yield Finding.of(told, {**conditions, "of": len(RULES)})
+    number = Estimate("properties_met", met, "", kind="count", reason=COUNTED())
+    yield Finding.of(number, {**conditions, "of": len(RULES)})
 
 
 def _analyse(data: TestData) -> Result:
     notes: list[str] = []
-    found = list(_judged(data, notes))
-    if not found:
+    verdicts = list(_judged(data, notes))
+    if not verdicts:
         return Result(notes=tuple(notes))
     return Result(
-        tables(found, _options(data).sets),
-        figures(found, data),
-        tuple(finding for each in found for finding in _findings(each)),
+        tables(verdicts, _options(data).sets),
+        figures(verdicts, data),
+        tuple(finding for each in verdicts for finding in _findings(each)),
         tuple(notes),
     )
 

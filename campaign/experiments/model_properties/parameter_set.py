@@ -1,4 +1,4 @@
-"""A parameter set that several friction models share, and the scales that follow from it."""
+"""A parameter set that several friction models share, and its scales."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from campaign.physics.friction.interface import FrictionOptions
 from campaign.trial import Tree
 
 FAR = 1e6
-"""Rate (rad/s) at which nothing is left of a Stribeck curve."""
+"""Rate (rad/s) far above a Stribeck curve."""
 
 
 def options_of(model: str, given: Mapping[str, JsonValue], *, own: bool) -> FrictionOptions:
-    """A model with those of the given parameters that it has.
+    """Options of a model with those of the given parameters that it has.
 
     Args:
-        own: without those that its source does not have (`FrictionModel.added`).
+        own: without the parameters that its source does not have (`FrictionModel.added`).
 
     Raises ValueError, with a message for the user.
     """
@@ -41,7 +41,7 @@ def options_of(model: str, given: Mapping[str, JsonValue], *, own: bool) -> Fric
 
 
 def with_friction(bench: Bench, options: FrictionOptions) -> Tree:
-    """The normalised bench with this friction in place of its first interface, and no other."""
+    """The normalized bench with this friction as its only interface, named as its first."""
     described: Tree = bench.with_friction({next(iter(bench.friction)): options}).model_dump(
         mode="json"
     )
@@ -64,7 +64,7 @@ class Scale:
         velocity: vs (rad/s), where 37 % of Ts - Tc is left.
         viscous: sigma2 (N m s/rad).
         stiffness: sigma0 (N m/rad).
-        own: s(0) (N m), the friction of slowest sliding of the model that is tried.
+        own: s(0) (N m), the friction of slowest sliding of the tested model.
     """
 
     inertia: float
@@ -77,9 +77,9 @@ class Scale:
 
     @classmethod
     def of(cls, given: Mapping[str, JsonValue], inertia: float, tried: str) -> Self:
-        """Of a set, for a model that is tried.
+        """The scale of a set, for a tested model.
 
-        Raises ValueError where the set's model has no Ts above Tc, or no stiffness at rest.
+        Raises ValueError if the set's model has no Ts above Tc, viscous friction or stiffness.
         """
         options: Any = options_of(str(given.get("model", "")), given, own=False)
         model = friction_models()[options.model]
@@ -108,15 +108,15 @@ class Scale:
 
     @property
     def deflection(self) -> float:
-        """Ts / sigma0 (rad): what bristles of a straight characteristic give before sliding."""
+        """Ts / sigma0 (rad): deflection of linear bristles before sliding."""
         return self.static / self.stiffness
 
     @property
     def amplitude(self) -> float:
-        """s(0) / 2 sigma0 (rad): half of what the tried model's bristles would give."""
+        """s(0) / 2 sigma0 (rad): half the deflection of the tested model's bristles."""
         return 0.5 * self.own / self.stiffness
 
     @property
     def natural_rate(self) -> float:
-        """rad/s, of the load on the stiffness."""
+        """Natural frequency (rad/s) of the load on the stiffness."""
         return math.sqrt(self.stiffness / self.inertia)

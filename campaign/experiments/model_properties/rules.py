@@ -1,4 +1,4 @@
-"""The rules by which a friction model has a property, with a control each way (Table 3.1)."""
+"""Rules for properties of friction models, each with two controls (Table 3.1)."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ MARKS = {MET: "+", PARTLY: "o", BLANK: "–"}
 DEPENDS = "depends"
 """The mark differs between parameter sets."""
 LOSS = 0.05
-"""Loss factor from which a presliding loop is one: 0 for a spring, 4/pi for dry sliding."""
+"""Smallest loss factor of a presliding loop: 0 for a spring, 4/pi for dry sliding."""
 CLOSES = 0.01
-"""Of the torque of the outer loop, by which an inner loop may miss the point where it began."""
+"""Largest closing error of an inner loop, over the torque of the outer loop."""
 REVERSIBLE = 0.5
-"""Share of a displacement that comes back, from which presliding is one."""
+"""Smallest reversible share of a displacement in presliding."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A property, and how a measured number decides on it.
+    """A property, and the decision on it by a measured number.
 
     Attributes:
         name: of the property, as the table's row.
         shows: name of the number that decides.
-        threshold: from which the property is met; from half of it, it is met partly.
-        sign: name of a further number that must be above zero, or the property is met partly.
+        threshold: value from which the property is met; from half of it, it is partly met.
+        sign: name of a further number; if it is not above zero, the property is partly met.
         text: the rule, for a reader.
         positive, negative: the controls: a model that has the property, and one that lacks it.
     """
@@ -40,7 +40,7 @@ class Rule:
     sign: str = ""
 
     def mark(self, numbers: Mapping[str, float]) -> float:
-        """The mark by what was measured of a model, name to number."""
+        """The mark by the measured numbers of a model, by name."""
         value = numbers[self.shows]
         if value < 0.5 * self.threshold:
             return BLANK
@@ -115,10 +115,10 @@ RULES = (
 
 @dataclass(frozen=True)
 class ModelVerdict:
-    """A model over all parameter sets.
+    """Numbers and marks of a model over all parameter sets.
 
     Attributes:
-        numbers: what the rules decide on, by set and name.
+        numbers: input of the rules, by set and name.
         sizes: numbers of `parameters`, of `state`, and of `switches`; None: not stated.
     """
 
@@ -131,6 +131,6 @@ class ModelVerdict:
         return sorted(rule.mark(numbers) for numbers in self.numbers.values())
 
     def sign(self, rule: Rule) -> str:
-        """As the table shows it."""
+        """Mark as in the table: of all sets, or `DEPENDS`."""
         marks = self.marks(rule)
         return MARKS[marks[0]] if marks[0] == marks[-1] else DEPENDS

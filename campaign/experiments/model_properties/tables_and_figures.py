@@ -21,7 +21,7 @@ from campaign.experiments.model_properties.rules import (
 from campaign.result import Axis, Column, Curve, Figure, Panel, Table
 
 ENDS = 1e-2, 1e2
-"""Of a number over its threshold, as drawn: what lies beyond is drawn there."""
+"""Ends of the axis of a number over its threshold; numbers beyond are drawn there."""
 
 
 def tables(
@@ -115,13 +115,13 @@ def tables(
 
 
 def _share(value: float, rule: Rule) -> float:
-    """Of the threshold, to three digits, up to the end of the figure's scale."""
+    """A number over its threshold, to three digits, up to the end of the figure's axis."""
     share = min(value / rule.threshold, ENDS[1])
     return 0.0 if abs(share) < 1e-3 else float(f"{share:.3g}")
 
 
 def figures(found: Sequence[ModelVerdict], data: TestData) -> tuple[Figure, ...]:
-    """The numbers over their thresholds; loops in presliding and around a rate of the first set."""
+    """Marks, numbers over thresholds, and loops in presliding and around a rate (first set)."""
     first = next(iter(found[0].numbers))
     own = [item for item in with_samples(data.completed()) if item.trial.point["set"] == first]
     loops = [
@@ -140,7 +140,7 @@ def figures(found: Sequence[ModelVerdict], data: TestData) -> tuple[Figure, ...]
 
 
 def _matrix(found: Sequence[ModelVerdict]) -> Figure:
-    """The marks of all models as a picture."""
+    """Marks of all models by property."""
     models = [each.model.replace("-", "-\n") for each in found]
     looks = {
         MARKS[MET]: ("met", "measured"),
@@ -212,7 +212,7 @@ def _decisions(found: Sequence[ModelVerdict]) -> Figure:
 
 
 def _longest(items: Sequence[TrialData], part: str) -> Iterator[TrialData]:
-    """Of each model the trial of a part that has the highest frequency, where it has one."""
+    """The trial of a part for each model; of several the one with the highest frequency."""
     best: dict[object, TrialData] = {}
     for item in items:
         point = item.trial.point

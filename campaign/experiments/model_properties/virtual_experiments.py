@@ -1,7 +1,7 @@
-"""The virtual experiments on a friction model: trials on the scale of its parameter set, numbers.
+"""Virtual experiments on a friction model: trials on the scale of its parameter set, and numbers.
 
-Four are those of other experiments (Figures 2.8 to 2.10 and 2.12), with options that follow from
-the scale. Presliding, drift and dwell time have motions of their own.
+Four come from other experiments (Figures 2.8 to 2.10 and 2.12), with options from the scale.
+Presliding, drift and dwell time have their own motions.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ COMPUTED = Cause(
     "computed without noise", "computed without noise; its error is that of the time step"
 )
 SLOWEST_RAMP = 1e-3
-"""of sigma0 vs, the ramp on which a bristle takes Ts/sigma0/vs to bend: three decades above it."""
+"""of sigma0 vs; three decades faster, a bristle takes Ts/sigma0/vs to deflect."""
 FREQUENCIES = (0.04, 0.4)
 """of vs / (2 pi Ts/sigma0), around a rate of 1.3 vs."""
 PULL, SOFT, STIFF = 20.0, 0.3, 100.0
-"""of vs; and of the stiffness in `_pull`: it rests for 0.4 of a period, and for 0.03."""
+"""Rate of the pull over vs; factors of the stiffness in `_pull`: rest of 0.4 and 0.03 periods."""
 PERIODS = 14
-"""Of a pull."""
+"""Periods in a pull."""
 PATH = (0.0, 1.0, -1.0, 1.0, -1.0, 0.2, -0.3, 0.2, 1.0)
-"""Turning points in presliding, of an amplitude of s / 2 sigma0: a loop twice, an inner loop."""
+"""Turning points in presliding, over s(0) / 2 sigma0: a loop twice, then an inner loop."""
 SEGMENT, PIECES = 4.0, 50
-"""s between turning points, and straight pieces of rate in it."""
+"""Time (s) between turning points, and number of linear pieces of rate in it."""
 HELD, SHAKEN, CYCLES = 0.4, 0.2, 100
-"""of Tc: constant torque and amplitude of vibration; cycles, of which the first ten settle."""
+"""of Tc: constant torque and amplitude of vibration; number of cycles, with ten to settle."""
 RISE = 0.01
-"""of Ts - Tc, by which fast sliding must lie above the dip to count as a rise."""
+"""of Ts - Tc: smallest rise of fast sliding above the dip."""
 DWELLS = (0.01, 1.0, 100.0)
-"""s at rest."""
+"""Dwell times (s)."""
 
 
 def _moved(command: Polyline, windows: tuple[Window, ...], rate: float) -> TrialRequest:
@@ -60,7 +60,7 @@ def _moved(command: Polyline, windows: tuple[Window, ...], rate: float) -> Trial
 
 def _ramps(scale: Scale) -> Mapping[str, Any]:
     rates = SLOWEST_RAMP * scale.stiffness * scale.velocity * 10.0 ** np.arange(4.0)
-    # Far beyond where bristles end to bend, on the fastest ramp, too.
+    # Far beyond the full deflection of bristles, even on the fastest ramp.
     slides = PULL * scale.velocity
     past = math.sqrt(2.0 * slides * scale.inertia * rates[-1]) + scale.viscous * slides
     return {
@@ -89,7 +89,7 @@ def _lag(scale: Scale) -> Mapping[str, Any]:
 def _pull(scale: Scale, stiffness: float) -> Mapping[str, Any]:
     """Through a spring of `stiffness` times ((Ts - Tc) / v)^2 / J, where v is the rate of the pull.
 
-    Through one of that stiffness a load that is let go at Ts reaches a rate of v above the pull.
+    At a factor of 1, a load released at Ts reaches a rate of v above the pull.
     """
     rate = PULL * scale.velocity
     stiffness *= (scale.excess / rate) ** 2 / scale.inertia
@@ -105,14 +105,14 @@ def _pull(scale: Scale, stiffness: float) -> Mapping[str, Any]:
 
 
 def _presliding(scale: Scale) -> TrialRequest:
-    """Along `PATH`, each way at a rate of half a sine."""
-    way = scale.amplitude * np.diff(PATH)
+    """Motion along `PATH`; the rate of each segment is half a sine."""
+    steps = scale.amplitude * np.diff(PATH)
     phase = np.arange(1, PIECES + 1) / PIECES
     shape = 0.5 * math.pi * np.sin(math.pi * phase) / SEGMENT
-    # Straight pieces of a sine enclose a little less than the sine does.
+    # Linear pieces of a sine enclose slightly less area than the sine.
     shape /= float(np.trapezoid(np.append(0.0, shape), dx=SEGMENT / PIECES))
-    times = SEGMENT * (np.arange(len(way))[:, None] + phase).ravel()
-    rates = np.outer(way, shape).ravel()
+    times = SEGMENT * (np.arange(len(steps))[:, None] + phase).ravel()
+    rates = np.outer(steps, shape).ravel()
     windows = tuple(
         Window(f"to {end:g}, {k + 1}", k * SEGMENT, (k + 1) * SEGMENT)
         for k, end in enumerate(PATH[1:])
@@ -145,7 +145,7 @@ def _drift(scale: Scale) -> TrialRequest:
 
 
 def _dwell(scale: Scale, rest: float) -> TrialRequest:
-    """Slides, rests, and slides on: from the same rate and the same bristles, whatever the rest."""
+    """Motion with a rest between two slides; rate and bristles before it are always the same."""
     time = 30.0 * scale.deflection / scale.velocity
     short = 0.1 * scale.deflection / scale.velocity
     again = short + time + short + rest
@@ -162,9 +162,9 @@ class Part:
     """A virtual experiment.
 
     Attributes:
-        requests: its trials, from the scale and a bench of no importance.
+        requests: its trials, from the scale and any bench.
         measure: numbers by name, from a recording and the scale.
-        requires: channels without which there is none.
+        requires: necessary channels.
     """
 
     requests: Callable[[Scale, Bench], Iterable[TrialRequest]]
@@ -174,7 +174,7 @@ class Part:
 
 @dataclass(frozen=True)
 class _AsIf:
-    """A trial as another experiment of other options sees it."""
+    """A trial with the options of another experiment."""
 
     data: TrialData
     options: Any
@@ -188,7 +188,7 @@ class _AsIf:
 
 
 def _like(experiment: Experiment, options: Callable[[Scale], Mapping[str, Any]]) -> Part:
-    """The trials and the metrics of another experiment."""
+    """A part with the trials and metrics of another experiment."""
     own: Any = experiment.measure
 
     def chosen(scale: Scale) -> Any:
@@ -212,7 +212,7 @@ def _pulled(stiffness: float) -> Part:
 
 
 def presliding_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
-    """Share that comes back, loss factor, and closure of the inner loop."""
+    """Reversible share, loss factor, and closure of the inner loop."""
     recording, amplitude = data.recording(), scale.amplitude
     x, torque = recording[RELATIVE_ANGLE], recording[FRICTION_TORQUE]
     ends = np.searchsorted(recording.time, SEGMENT * np.arange(len(PATH)) - 1e-9)
@@ -234,7 +234,7 @@ def presliding_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
 
 
 def _drift_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
-    """By the means of two cycles: a load on a spring without damping rings within each."""
+    """Drift margin from the means of two cycles: within each an undamped load oscillates."""
     recording = data.recording()
     first, last = (
         float(np.mean(recording.window(each.start, each.stop)[RELATIVE_ANGLE]))
@@ -268,7 +268,7 @@ PARTS: Mapping[str, Part] = {
 
 
 def requests(scale: Scale, bench: Bench) -> Iterator[TrialRequest]:
-    """All trials of a model, each with its part in its point."""
+    """All trials of a model; the point of each states its part."""
     for name, part in PARTS.items():
         for request in part.requests(scale, bench):
             point = {"part": name, **request.point}
@@ -276,19 +276,19 @@ def requests(scale: Scale, bench: Bench) -> Iterator[TrialRequest]:
 
 
 def estimates(data: TrialData, scale: Scale) -> Sequence[Estimate]:
-    """What a recording shows, SI."""
-    found = PARTS[str(data.trial.point["part"])].measure(data, scale)
-    return [Estimate.without_interval(name, value, "", COMPUTED()) for name, value in found.items()]
+    """Numbers of a recording, SI."""
+    sizes = PARTS[str(data.trial.point["part"])].measure(data, scale)
+    return [Estimate.without_interval(name, value, "", COMPUTED()) for name, value in sizes.items()]
 
 
 Measured = Sequence[tuple[Mapping[str, Any], Mapping[str, Estimate]]]
-"""Of each trial of a model its point, and what was measured."""
+"""Point and metrics of each trial of a model."""
 
 
 def numbers_of(found: Measured, scale: Scale) -> dict[str, float]:
-    """What the rules decide on, by name; of all trials of a model.
+    """Input of the rules by name, from all trials of a model.
 
-    Raises ValueError where a number is not determined: no mark follows from it.
+    Raises ValueError if a number is not determined: no mark follows from it.
     """
 
     def value(point: Mapping[str, Any], measured: Mapping[str, Estimate], name: str) -> float:
@@ -316,7 +316,7 @@ def numbers_of(found: Measured, scale: Scale) -> dict[str, float]:
     }
     loses = presliding["loss_factor"] >= LOSS
     reversible = presliding["reversible_share"] >= REVERSIBLE
-    # A spring has no loop to close, and dry sliding no presliding.
+    # A spring has no loop to close, and dry sliding has no presliding.
     closure = presliding["closure"] if loses and reversible else 0.0
     return {
         "reversible_share": presliding["reversible_share"],

@@ -1,1 +1,1 @@
-"""Recorded motion: what anybody moved the axis by."""
+"""Recorded motion of any origin."""

@@ -1,4 +1,4 @@
-"""What recorded motions show: steady stretches, friction of each direction, tables."""
+"""Numbers of recorded motions: steady stretches, friction of each direction, tables."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 
 OFFSET = 0.3
-"""of Coulomb friction, from which on what both directions do not share is told as a load."""
+"""of Coulomb friction: above this share, half the difference of directions gets a note."""
 OF_LOAD, WHAT_HOLDS = "friction_coefficient", "constant_torque"
 
 
 @dataclass(frozen=True)
 class Motion:
-    """One recording with what it shows.
+    """One recording with its numbers.
 
     Attributes:
         found: metrics of the whole recording, by name.
-        constant: half of what Coulomb friction of the directions differs by: a load, an offset, or
-            friction that differs by direction; None without both.
+        constant: half the difference of Coulomb friction between the directions: a load, an offset,
+            or asymmetric friction; None without both directions.
         coefficient: mean of friction over normal load of all stretches; None without any.
     """
 
@@ -47,15 +47,15 @@ class Motion:
 
     @property
     def coulomb(self) -> dict[str, Estimate]:
-        """Coulomb friction by direction, where it is known apart from viscous friction."""
+        """Coulomb friction by direction, if it is separate from viscous friction."""
         name = "coulomb_torque"
-        return {way: own[name] for way, own in self.sliding.found.items() if name in own}
+        return {side: own[name] for side, own in self.sliding.found.items() if name in own}
 
 
 def account_of(
     data: TrialData, found: Mapping[str, Estimate], options: StretchOptions, notes: list[str]
 ) -> Motion:
-    """What a recording shows; what it does not show is added to `notes`."""
+    """Numbers of a recording; reasons for missing ones are added to `notes`."""
     label = data.trial.label
     sliding = sliding_of((data,), options)
     notes += (f"{label}: {note}" for note in sliding.notes)
@@ -83,22 +83,22 @@ def _mean_coefficient(sliding: SteadyResult) -> Estimate | None:
 
 
 def _coulomb_fitted(sliding: SteadyResult) -> dict[str, Estimate]:
-    """Coulomb friction by direction, as fitted."""
-    found = next((each.found for each in sliding.maps if each.quantity is FRICTION), {})
-    every = {way: own.get("coulomb_torque") for way, own in found.items()}
-    return {way: one for way, one in every.items() if one is not None and one.has_interval}
+    """Fitted Coulomb friction by direction, if it has an interval."""
+    fits = next((each.found for each in sliding.maps if each.quantity is FRICTION), {})
+    every = {side: own.get("coulomb_torque") for side, own in fits.items()}
+    return {side: one for side, one in every.items() if one is not None and one.has_interval}
 
 
 def _constant(sliding: SteadyResult) -> Estimate | None:
-    found = _coulomb_fitted(sliding)
-    if len(found) < 2:
+    coulomb = _coulomb_fitted(sliding)
+    if len(coulomb) < 2:
         return None
-    told = multiplied(difference(WHAT_HOLDS, found["positive"], found["negative"], "N m"), 0.5)
-    # What was taken off by the angle has the same sign in both directions, as a constant has.
-    doubt = 0.5 * sum(
-        sliding.maps[0].doubts.get((way, "coulomb_torque"), 0.0) for way in DIRECTIONS
+    half = multiplied(difference(WHAT_HOLDS, coulomb["positive"], coulomb["negative"], "N m"), 0.5)
+    # The correction by angle has the same sign in both directions, as a constant has.
+    error = 0.5 * sum(
+        sliding.maps[0].doubts.get((direction, "coulomb_torque"), 0.0) for direction in DIRECTIONS
     )
-    return shifted_by(told, ANGLE, doubt) if doubt else told
+    return shifted_by(half, ANGLE, error) if error else half
 
 
 def is_surely_something(estimate: Estimate) -> bool:
@@ -108,7 +108,7 @@ def is_surely_something(estimate: Estimate) -> bool:
 
 
 def _doubts(label: str, found: Mapping[str, Estimate], sliding: SteadyResult) -> Iterator[str]:
-    """What a reader of stretches should know."""
+    """Notes on missing stretches and a missing radius."""
     if not sliding.points:
         cause = "`shortest` says how long a steady stretch is"
         if lost := found["lost"].value:
@@ -136,7 +136,7 @@ _SUMMARY = (
 
 
 def summary_table(motions: Sequence[Motion]) -> Table:
-    """What each recording is."""
+    """Extremes of each recording."""
     columns = [c for c in _SUMMARY if any(c.name in motion.found for motion in motions)]
     rows: list[dict[str, Cell]] = []
     for motion in motions:
@@ -204,6 +204,6 @@ def motion_findings(motion: Motion) -> Iterator[Finding]:
 
 
 def _places(motions: Sequence[Motion]) -> Iterator[Column]:
-    """What was set differently for the recordings, or is known of them."""
+    """Columns of the conditions of the recordings."""
     for name in dict.fromkeys(name for motion in motions for name in motion.place):
         yield Column(name, name.replace("_", " ").capitalize(), exact=True)

@@ -1,8 +1,8 @@
 """Any recorded motion: course, force, tracking error, friction over rate.
 
-For recordings that nobody planned as an experiment of this program. Friction is read where the axis
-happens to slide steadily (Equation 4.1 without acceleration), in both directions; nothing is
-claimed of the rest of the motion but what it was.
+For recordings without a planned experiment of this program. Friction is estimated where the axis
+slides steadily (Equation 4.1 without acceleration), in both directions. The rest of the motion is
+only described.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ CAN_USE = {
     NORMAL_LOAD: "friction coefficient",
     JOINT_TORQUE: "friction without what accelerates the load",
 }
-"""Further channels, and what there is none of without them."""
+"""Optional channels, and the results that need them."""
 MOST_SAMPLES = 10_000_000
-"""of a recording that is looked at in one: at 1 kHz some three hours."""
+"""Largest number of samples of a recording: at 1 kHz about three hours."""
 
 
 class MotionOptions(StretchOptions):
@@ -60,7 +60,7 @@ class MotionOptions(StretchOptions):
 def _found(
     options: MotionOptions, bench: Bench, offered: OfferedRecording
 ) -> Iterator[TrialRequest]:
-    """The whole recording; a sensor in the joint tells friction without what accelerates."""
+    """The whole recording; a sensor in the joint measures friction without inertia torque."""
     force = JOINT_TORQUE if JOINT_TORQUE in offered.channels else DRIVE_TORQUE
     yield TrialRequest(
         Task(

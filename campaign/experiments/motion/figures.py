@@ -70,19 +70,19 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
 
 
 def friction_figure(motion: Motion, suffix: str) -> Figure:
-    """Friction of the steady stretches over their rate, both directions, with what was fitted."""
+    """Friction of the steady stretches over their rate, in both directions, with the fits."""
     sliding = motion.sliding
     panels = [panel for each in sliding.maps for panel in rate_panels(each)]
     distances = zip(_distances(motion), sliding.points, strict=True)
     loaded = [(at, point) for at, point in distances if np.isfinite(point.load)]
     if loaded:
-        found = [coefficient_of(point, sliding.first) for _, point in loaded]
+        coefficients = [coefficient_of(point, sliding.first) for _, point in loaded]
         at = np.array([distance for distance, _ in loaded])
         panels.append(
             Panel(
                 Axis("Distance slid", "rad", "deg"),
                 Axis("Friction coefficient"),
-                [Curve.of(at, found, "", "measured")],
+                [Curve.of(at, coefficients, "", "measured")],
                 "Friction over normal load",
             )
         )
@@ -99,7 +99,7 @@ def friction_figure(motion: Motion, suffix: str) -> Figure:
 
 
 def _distances(motion: Motion) -> list[float]:
-    """How far the axis had slid in all by the middle of each stretch, whichever way."""
+    """Total slid distance, in either direction, up to the middle of each stretch."""
     recording = motion.data.recording()
     rate = np.nan_to_num(np.abs(recording[RELATIVE_RATE]))
     slid = np.concatenate(

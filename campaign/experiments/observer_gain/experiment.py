@@ -1,12 +1,11 @@
 """Observer gain: benefit and cost of a higher gain (5.3.2 to 5.3.4).
 
-Three things are measured at every gain, beside what the linear theory says of the same bench:
-the stabilization error under base motion; how much of a disturbance torque comes through as rate
-(Equation 5.4); and how much of the gyro's noise does (Equation 5.5). A gain at which a trial runs
-into a limit or diverges is a result too: the loop is unstable there.
+Three quantities are measured at every gain and compared with linear theory for the same bench: the
+stabilization error under base motion, the rate per disturbance torque (Equation 5.4), and the rate
+from the gyro's noise (Equation 5.5). A trial that reaches a limit or diverges is a result too: the
+loop is unstable at that gain.
 
-The gain is told by the corner frequency N K0 / (2 pi J') of the observer, which means the same on
-every bench.
+The corner frequency N K0 / (2 pi J') of the observer states the gain, comparable between benches.
 """
 
 from __future__ import annotations
@@ -66,7 +65,7 @@ from campaign.units import Frequency, Time, Torque, in_words
 ALL_STABLE = Cause("stable at every gain", "stable at every gain that was tried")
 CORNERS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
 SETTLE = 2.0
-"""s; at least, before a disturbance or noise is measured."""
+"""Shortest time (s) before a measurement of a disturbance or noise."""
 
 
 class ObserverGainOptions(SineMotionOptions):
@@ -112,7 +111,7 @@ def _benches(options: ObserverGainOptions, bench: Bench) -> Iterator[tuple[float
 
 
 def predicted_limit(bench: Bench, name: str, highest: float) -> float | None:
-    """Corner frequency (Hz) from which the linear loop is unstable; None when not by `highest`."""
+    """Corner frequency (Hz) from which the linear loop is unstable; None if stable at `highest`."""
 
     def is_stable(corner: float) -> bool:
         return growth_rate(_tuned(bench, name, corner), name) < 0
@@ -127,7 +126,7 @@ def predicted_limit(bench: Bench, name: str, highest: float) -> float | None:
 
 
 def _fit(options: ObserverGainOptions, bench: Bench) -> Mapping[str, ChosenValue]:
-    """The base motion, and times of noise and disturbance within the limit of duration."""
+    """Default base motion; times of noise and disturbance within the limit of duration."""
     choices, longest = Choices(options), MOST * limits_of(bench).duration
     why = share("duration", MOST)
     if longest < SETTLE + options.noise_time:
@@ -149,7 +148,7 @@ def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest
         linear = with_changes(tuned, {"friction": {}}) if options.without_friction else plain
         yield _request(options.task(name), plain, corner, "error")
         if corner and growth_rate(tuned, name) >= 0:
-            continue  # it will end early; once is enough to know
+            continue  # unstable: the first trial shows it
         if options.noise_time and is_noisy(bench):
             task = rest_task(name, SETTLE, SETTLE + options.noise_time, options.sample_rate)
             yield _request(task, linear, corner, "noise")
@@ -159,7 +158,7 @@ def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest
 
 
 REQUIRED = {"error": POINTING_ERROR, "noise": LOAD_RATE, "rejection": GYRO_RATE}
-"""The channel that a trial is about, by what it measures."""
+"""Required channel of a trial, by its measured quantity."""
 
 
 def _request(task: Task, bench: Tree, corner: float, measured: str, **more: float) -> TrialRequest:
@@ -218,22 +217,22 @@ def _findings(
         if gain.noise is not None:
             yield Finding.of(gain.noise, where)
         for point in gain.rejection:
-            there = {**where, "disturbance_frequency": point.frequency}
-            yield Finding.of(point.measured, there)
+            point_where = {**where, "disturbance_frequency": point.frequency}
+            yield Finding.of(point.measured, point_where)
     yield from _limit_found(gains)
     chosen = [g for g in gains if np.isclose(g.corner, own)]
     if chosen and chosen[0].error is not None:
         yield Finding.of(chosen[0].error, {**motion, "compensation": options.observer})
     corner = measured_corner(chosen[0], gains[0]) if chosen and gains[0].corner == 0 else None
     if corner is not None:
-        told: dict[str, Value] = {"compensation": options.observer}
-        yield Finding.of(corner, told)
+        conditions: dict[str, Value] = {"compensation": options.observer}
+        yield Finding.of(corner, conditions)
         load_gain = shifted_by(multiplied(corner, 2 * np.pi * inertia), "inertia", None)
-        yield Finding.of(replace(load_gain, name="observer_gain", unit="N m s/rad"), told)
+        yield Finding.of(replace(load_gain, name="observer_gain", unit="N m s/rad"), conditions)
 
 
 def _limit_found(gains: list[Gain]) -> Iterator[Finding]:
-    """Where the loop becomes unstable: between two gains that were tried, or beyond all of them."""
+    """Corner frequency of instability: between two measured gains, or above all of them."""
     name = "unstable_corner_frequency"
     stable = [gain.corner for gain in gains if gain.corner and gain.stable]
     first = _first_unstable(gains)
@@ -331,7 +330,7 @@ EXPERIMENT = Experiment(
         LOAD_RATE: 'what the noise of the gyro does to the load; noise_time = "0 s" does without',
     },
     can_use={FRICTION_TORQUE: "error by Eq. 5.4 beside the measured one"},
-    # Where the gain makes the loop unstable is one of its results.
+    # The gain at which the loop becomes unstable is one of the results.
     seeks_instability=True,
     uses_failed=True,
     key_numbers=(

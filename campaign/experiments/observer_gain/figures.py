@@ -12,23 +12,22 @@ from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 CORNER = Axis("Corner frequency N K0 / (2π J')", "Hz", "Hz", scale="log")
 BEYOND = 2.0
-"""times the highest gain tried, up to which a limit of stability is drawn."""
+"""Limit of stability up to which it is drawn, in multiples of the highest gain."""
 SHOWN_GAINS = 4
-"""curves in the figure of rejection, the one without observer among them."""
+"""Curves in the figure of rejection, including the one without observer."""
 
 
 def _pairs(gains: Sequence[Gain], name: str) -> tuple[Array, list[Estimate]]:
-    """Corner frequencies and estimates, of stable gains with an observer that have them."""
+    """Corner frequencies and estimates of stable gains with an observer and an estimate."""
     stable = [(g.corner, getattr(g, name)) for g in gains if g.corner and not g.unstable]
     known = [(corner, value) for corner, value in stable if value is not None]
     return np.array([corner for corner, _ in known]), [value for _, value in known]
 
 
 def _marks(gains: Sequence[Gain], own: float, limit: float | None, name: str) -> list[Mark]:
-    """The bench's own gain, where the loop becomes unstable, and where its eigenvalues say so;
-    a quantity without observer, by its name.
+    """Marks of the bench's own gain, of instability, and of the quantity without observer.
 
-    limit: by the eigenvalues (Hz); None where they say stable.
+    limit: of stability by the eigenvalues (Hz); None if stable. name: of the quantity.
     """
     marks = [Mark("the bench's", x=own)]
     unstable = next((gain.corner for gain in gains if gain.unstable), None)
@@ -46,7 +45,7 @@ def _marks(gains: Sequence[Gain], own: float, limit: float | None, name: str) ->
 
 
 def _stability_words(gains: Sequence[Gain]) -> str:
-    """What is shaded, or that nothing is."""
+    """Caption sentence on the shaded range, or on stability at every gain."""
     if any(gain.unstable for gain in gains):
         return " Shaded: between the highest gain that was stable and the lowest that was not."
     highest = max((gain.corner for gain in gains), default=0.0)
@@ -132,10 +131,10 @@ def rejection_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
 
 
 def _spread(gains: Sequence[Gain], own: float) -> list[Gain]:
-    """A few gains: the one without observer, the bench's own, and some evenly between."""
+    """Gains for a figure: without observer, the bench's own, and some at even spacing."""
     with_observer = [gain for gain in gains if gain.corner]
     picks = np.unique(np.linspace(0, len(with_observer) - 1, SHOWN_GAINS - 1).round().astype(int))
     chosen = [with_observer[i] for i in picks] if with_observer else []
-    mine = [g for g in with_observer if np.isclose(g.corner, own) and g not in chosen]
+    own_gains = [g for g in with_observer if np.isclose(g.corner, own) and g not in chosen]
     plain = [gain for gain in gains if not gain.corner]
-    return plain + sorted(chosen + mine[:1], key=lambda gain: gain.corner)
+    return plain + sorted(chosen + own_gains[:1], key=lambda gain: gain.corner)

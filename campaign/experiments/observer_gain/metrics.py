@@ -34,7 +34,7 @@ TOO_FEW = Cause(
     "{frequencies} frequencies; from {enough} on their range encloses it",
 )
 ENOUGH = 6
-"""frequencies whose lowest and highest answer enclose the median in 97 % of cases (sign test)."""
+"""Frequencies whose lowest and highest result enclose the median in 97 % of cases (sign test)."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Rejection:
 
 @dataclass(frozen=True)
 class Gain:
-    """What was found at one gain, SI; None where it was not measured, or not stable.
+    """Results at one gain, SI; None where not measured or not stable.
 
     Attributes:
         corner: Hz; 0 is without observer.
@@ -93,7 +93,7 @@ def _corner(data: TrialData) -> float:
 
 
 def _place(data: TrialData) -> dict[str, JsonValue]:
-    """What a trial measures, whatever the gain."""
+    """Sweep point of a trial without its gain."""
     return {name: value for name, value in data.trial.point.items() if name != "corner"}
 
 
@@ -107,7 +107,7 @@ def _bench(data: TrialData) -> CompleteBench:
 
 
 def measure(data: TrialData) -> list[Estimate]:
-    """The number that a trial is about; beside the error, what Eq. 5.4 makes of its friction."""
+    """Metric of a trial; for an error also the one by Eq. 5.4 from the friction of the trial."""
     return found(_measured(data, measured_part(data)))
 
 
@@ -128,14 +128,14 @@ def _measured(data: TrialData, cut: Recording) -> Iterator[Estimate]:
 
 
 def ends_early(data: TrialData) -> bool:
-    """Whether a trial ran into a limit, or diverged."""
+    """Whether a trial reached a limit or diverged."""
     return data.ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED)
 
 
 def gain_of(corner: float, group: Sequence[TrialData], without: Sequence[TrialData]) -> Gain:
-    """What all trials at one corner frequency (Hz) say.
+    """Results of all trials at one corner frequency (Hz).
 
-    A trial that ends early also without observer, as those of `without` show, tells no instability.
+    An early end is no instability if the same trial of `without` (no observer) ends early too.
     """
     lost = [_place(item) for item in without if ends_early(item)]
     ended = [item for item in group if ends_early(item) and _place(item) not in lost]
@@ -158,7 +158,7 @@ def gain_of(corner: float, group: Sequence[TrialData], without: Sequence[TrialDa
 
 
 def _together(group: Sequence[TrialData], name: str) -> Estimate | None:
-    """A metric of the repetitions of a trial; None where no recording has it."""
+    """Metric over the repetitions of a trial; None if no recording has it."""
     estimates = of_each(group, measure, name)
     if not estimates:
         return None
@@ -180,10 +180,10 @@ def _rejections(
 def predicted_error(
     recording: Recording, bench: CompleteBench, corner: float, inertia: float | None
 ) -> float:
-    """Error (rad, 1 sigma) that Eq. 5.4 makes of the friction of a recording of whole cycles.
+    """Error (rad, 1 sigma) by Eq. 5.4 from the friction in a recording of whole cycles.
 
-    The true friction is the disturbance; its spectrum through w/Td and the integration to an angle
-    gives the error. A simulator alone knows it.
+    The disturbance is the true friction, known to a simulator only. The error is its spectrum times
+    w/Td, integrated to an angle with the pointing high-pass.
     """
     time = recording.time
     count = len(time)
@@ -200,11 +200,11 @@ def predicted_error(
 
 
 def measured_corner(gain: Gain, without: Gain) -> Estimate | None:
-    """Corner frequency (Hz) that explains by how much the observer reduced |w/Td|.
+    """Corner frequency (Hz) from the reduction of |w/Td| by the observer; None without reduction.
 
-    By Eq. 5.4 the ratio of the two is s / (s + a), so that (1 / ratio)^2 - 1 = (a / w)^2. The value
-    is the median over the frequencies; its interval, from the lowest to the highest answer,
-    encloses the median of such answers however they are distributed.
+    By Eq. 5.4 |w/Td| has the ratio s / (s + a) to that without observer: (1 / ratio)^2 - 1 =
+    (a / w)^2. The value is the median over the frequencies. The interval, from the lowest to the
+    highest result, encloses the median for any distribution of the results.
     """
     known = {point.frequency: point.measured.value for point in without.rejection}
     pairs = [
@@ -225,7 +225,7 @@ def measured_corner(gain: Gain, without: Gain) -> Estimate | None:
 
 
 def worst_ratio(gain: Gain) -> Estimate | None:
-    """Measured |w/Td| over Eq. 5.4, where it is farthest from 1; None where none was measured."""
+    """Measured |w/Td| over that of Eq. 5.4, the ratio farthest from 1; None if not measured."""
     if not gain.rejection:
         return None
     worst = max(gain.rejection, key=lambda point: abs(point.measured.value / point.expected - 1))

@@ -1,1 +1,1 @@
-"""What becomes of recordings before an analysis sees them, and of what several draws found."""
+"""Checks of recordings before an analysis, and processing of results after it."""

@@ -1,8 +1,8 @@
 """Results in the units and terms of the bench's axis.
 
-Analyses are written for a rotary axis; of a linear one the numbers (SI) are the same, and here they
-get their units. Names stay: those of tables, columns, findings and conditions. What cannot be told
-from the outside, a number of degrees within a sentence, analyses write with `units.in_words`.
+Analyses are written for a rotary axis. For a linear one the numbers (SI) are the same; this module
+sets their units. Names of tables, columns, findings and conditions stay. Analyses write numbers of
+degrees within a sentence, which this module cannot recognize, with `units.in_words`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from campaign.estimate import Estimate
 from campaign.result import Cell, Result, Table
 
 UNITS = frozenset({"unit", "display"})
-"""Fields that are units, of whatever part of a result has them ..."""
+"""Fields that are units, in any part of a result ..."""
 TEXTS = frozenset(
     {"title", "label", "note", "caption", "alt", "method", "meaning", "advice", "text", "what"}
 )
@@ -30,17 +30,17 @@ PARTS = frozenset(
 """... and fields that have parts of their own."""
 Part = TypeVar("Part", Result, Estimate)
 NAMES = ("name", "quantity", "label")
-"""Fields that tell a phase from an angle of the axis."""
+"""Fields that distinguish a phase from an angle of the axis."""
 
 
 def in_axis_units(part: Part) -> Part:
-    """The same result, or estimate, told of the axis that is meant (`axis_kind.axis_terms`)."""
-    told: Part = _told(part) if is_linear() else part
-    return told
+    """Result or estimate in terms of the current axis (`axis_kind.axis_terms`)."""
+    converted: Part = _told(part) if is_linear() else part
+    return converted
 
 
 def _told(part: Any) -> Any:
-    """A part of a result: its units, unless it is of a phase, its texts, and the parts it has."""
+    """Convert a part of a result: its units, except those of a phase, its texts, and its parts."""
     if isinstance(part, str):
         return in_axis_terms(part)
     if isinstance(part, list | tuple):
@@ -50,24 +50,24 @@ def _told(part: Any) -> Any:
     if not hasattr(part, "__dataclass_fields__"):
         return part
     phase = _is_phase(*(str(getattr(part, name, "")) for name in NAMES))
-    told: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     for name in (each.name for each in fields(part)):
         value = getattr(part, name)
         if name in UNITS:
-            told[name] = value if phase else axis_unit(value)
+            changes[name] = value if phase else axis_unit(value)
         elif name in TEXTS:
-            told[name] = in_axis_terms(value)
+            changes[name] = in_axis_terms(value)
         elif name in PARTS:
-            told[name] = _told(value)
+            changes[name] = _told(value)
         elif name == "places":  # of an axis
-            told[name] = tuple((at, in_axis_terms(word)) for at, word in value)
+            changes[name] = tuple((at, in_axis_terms(word)) for at, word in value)
         elif name == "rows":
-            told[name] = tuple(_row(part, row) for row in value)
-    return replace(part, **told)
+            changes[name] = tuple(_row(part, row) for row in value)
+    return replace(part, **changes)
 
 
 def _is_phase(*names: str) -> bool:
-    """Whether a number is an angle of no axis: a phase, a phase margin."""
+    """Whether a number is an angle, but not of an axis: a phase, a phase margin."""
     return any("phase" in name.lower() for name in names)
 
 

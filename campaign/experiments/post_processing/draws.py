@@ -1,7 +1,7 @@
 """A test with several draws of a random bench, analyzed draw by draw.
 
-Every experiment can be swept so, and knows nothing of it: each draw is analysed as if it were all
-there is, and what the draws found is put side by side here.
+Every experiment can be swept over draws without code of its own: each draw is analysed alone, and
+this module combines the results.
 """
 
 from __future__ import annotations
@@ -14,39 +14,39 @@ from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.trial import Trial
 
 NOTES = 12
-"""Most notes of an analysis that are repeated for other draws than the first."""
+"""Most notes of draws other than the first."""
 
 
 def draws_of(trials: Iterable[Trial]) -> tuple[Value, ...]:
-    """Seeds that a test sweeps, in plan order; none of a test that sweeps no seed."""
+    """Seeds that a test sweeps, in plan order; empty without a swept seed."""
     seeds = (trial.point[SEED] for trial in trials if SEED in trial.point)
     return tuple(dict.fromkeys(seed for seed in seeds if isinstance(seed, int)))
 
 
 def merged(results: Mapping[Value, Result]) -> Result:
-    """The results of several draws, by seed: findings of all, else those of one.
+    """Combine results by seed: findings, notes and doubts of all, tables and figures of one.
 
-    A table says of every number of which several draws found one how these lie.
+    A further table shows the distribution of each quantity that several draws have.
     """
     seed = next((own for own, result in results.items() if result.tables), next(iter(results)))
     first = results[seed]
     others = [result for own, result in results.items() if own != seed]
-    found = tuple(
+    findings = tuple(
         replace(finding, conditions={**finding.conditions, SEED: own})
         for own, result in results.items()
         for finding in result.findings
     )
-    told = f"{len(results)} draws of the bench's scatter; tables and figures are of seed {seed}."
+    summary = f"{len(results)} draws of the bench's scatter; tables and figures are of seed {seed}."
     more = dict.fromkeys(note for result in others for note in result.notes)
     notes = [note for note in more if note not in first.notes]
     if len(notes) > NOTES:
         notes = [*notes[:NOTES], f"{len(notes) - NOTES} more notes are of other draws."]
-    table = _table(found, tuple(results))
+    table = _table(findings, tuple(results))
     return Result(
         (table, *first.tables) if table.rows else first.tables,
         first.figures,
-        found,
-        (told, *first.notes, *notes),
+        findings,
+        (summary, *first.notes, *notes),
         telling=first.telling,
         doubts=tuple(doubt for result in results.values() for doubt in result.doubts),
     )
@@ -73,13 +73,13 @@ def _rows(found: Iterable[Finding], seeds: tuple[Value, ...]) -> Iterator[Mappin
     for group in by_draw(found):
         if len(group) < 2:
             continue
-        told = together(group, seeds)
+        combined = together(group, seeds)
         yield {
-            "quantity": told.quantity.replace("_", " "),
-            "conditions": _words(told.conditions),
-            "unit": told.unit,
+            "quantity": combined.quantity.replace("_", " "),
+            "conditions": _words(combined.conditions),
+            "unit": combined.unit,
             "draws": len(group),
-            "spread": told.known,
+            "spread": combined.known,
         }
 
 

@@ -1,4 +1,4 @@
-"""Key numbers of a test: the findings that answer what it asks."""
+"""Key numbers of a test: the findings that answer its question."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from campaign.published.draws import by_draw, together
 from campaign.result import Finding, Value
 
 MOST = 8
-"""Key numbers of a test that are shown of all of its places."""
+"""Most key numbers that are shown for all points of a sweep."""
 FIRST = 24
-"""Findings that stand for those of an experiment that declares none."""
+"""Most findings that replace missing key numbers."""
 WITHIN_A_PLACE = (
     "compensation",
     "component",
@@ -22,17 +22,17 @@ WITHIN_A_PLACE = (
     "set",
     "statistic",
 )
-"""Conditions in which numbers of one place of a sweep differ."""
+"""Conditions in which numbers of one point of a sweep differ."""
 
 
 def key_numbers(
     findings: Sequence[Finding], wanted: Sequence[KeyQuantity], draws: Sequence[Value] = ()
 ) -> tuple[Finding, ...]:
-    """The findings that are wanted, in that order; the first where there are none of these.
+    """Wanted findings in that order; the first `FIRST` findings without any of them.
 
-    Several `draws` of a random bench, by their seeds, have one number: their median, and where one
-    more lies. Of a sweep with more than `MOST` the numbers of its first and of its last place are
-    chosen: by place and not by size, so that their intervals still hold.
+    Several `draws` (seeds) of a random bench have one number: their median, with the interval of
+    one further draw. Of more than `MOST`, those of the first and the last point of the sweep are
+    chosen: by point and not by size, so that their intervals remain valid.
     """
     every = list(findings)
     if len(draws) > 1:
@@ -47,9 +47,9 @@ def key_numbers(
 
 
 def _is(wanted: KeyQuantity, finding: Finding) -> bool:
-    told = finding.conditions
+    conditions = finding.conditions
     return finding.quantity == wanted.quantity and all(
-        name in told and told[name] == value for name, value in wanted.where.items()
+        name in conditions and conditions[name] == value for name, value in wanted.where.items()
     )
 
 

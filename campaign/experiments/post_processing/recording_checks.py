@@ -1,7 +1,7 @@
 """Checks of a recording before its analysis.
 
-A sensor that is not connected, a log that was cut off, a drive that never moved: such a recording
-costs its own numbers and a note, not those of the other trials.
+A recording of an unconnected sensor, a truncated log or a drive that never moved has no numbers and
+adds a note. Numbers of other trials remain.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from campaign.signals import Zero
 from campaign.trial import Role, Trial
 
 FEWEST = 3
-"""Samples below which nothing can be said of any signal."""
+"""Fewest samples for an analysis."""
 NOT_RECORDED = Cause("channel not recorded", "no {channels} was recorded")
 TOO_SHORT = Cause("too short", "{samples} samples were recorded")
 NO_NUMBERS = Cause("no numbers", "{channel} has no numbers")
@@ -30,10 +30,10 @@ NOT_KEPT = Cause("samples not kept", "nothing was measured, and the samples were
 
 
 def doubt(data: TrialData) -> RecordingDoubt | None:
-    """What is wrong with the recording of a completed measurement.
+    """Doubt about the recording of a completed measurement, or None.
 
-    Nothing where it was measured when the trial ended, as its samples are not read again then, nor
-    where the trial requires no channel: what it is after, its experiment alone knows.
+    None if it was measured when the trial ended, because its samples are not read again, and if the
+    trial requires no channel, because only its experiment can check it.
     """
     trial = data.trial
     measured = data.ending.outcome == Outcome.COMPLETED and trial.role == Role.MEASUREMENT
@@ -58,7 +58,7 @@ def _doubt(recording: Recording, trial: Trial) -> RecordingDoubt | None:
             return doubted(trial, NO_NUMBERS(channel=name), fatal=False)
     task = trial.task
     if all(isinstance(s, Zero) for s in (task.command, task.disturbance, task.base_acceleration)):
-        return None  # nothing was to move
+        return None  # no motion was commanded
     still = [name for name, values in samples.items() if np.all(values == values[0])]
     if not still:
         return None
@@ -68,18 +68,18 @@ def _doubt(recording: Recording, trial: Trial) -> RecordingDoubt | None:
 
 
 def not_measured(trial: Trial, error: BaseException) -> RecordingDoubt:
-    """That the analysis of one trial failed; a ValueError has a message for the user."""
-    told = str(error) if isinstance(error, ValueError) else ""
-    return doubted(trial, NOT_MEASURED(error=told.partition("\n")[0][:300] or one_line(error)))
+    """Doubt for a failed analysis of one trial; a ValueError has a message for the user."""
+    message = str(error) if isinstance(error, ValueError) else ""
+    return doubted(trial, NOT_MEASURED(error=message.partition("\n")[0][:300] or one_line(error)))
 
 
 def doubted(trial: Trial, reason: Reason, *, fatal: bool = True) -> RecordingDoubt:
-    """A doubt of the recording of a trial."""
+    """Doubt about the recording of a trial."""
     return RecordingDoubt(trial.number, trial.label, reason, fatal)
 
 
 def notes_on(doubts: Iterable[RecordingDoubt], trials: int) -> tuple[str, ...]:
-    """A sentence for each thing that was wrong, with those of all `trials` it was wrong with."""
+    """One sentence for each defect, with its share of the number of all `trials`."""
     groups: dict[tuple[Reason, bool], list[RecordingDoubt]] = {}
     for each in doubts:
         groups.setdefault((each.reason, each.fatal), []).append(each)
@@ -91,6 +91,6 @@ def notes_on(doubts: Iterable[RecordingDoubt], trials: int) -> tuple[str, ...]:
 
 
 def _listed(group: Sequence[RecordingDoubt]) -> str:
-    told = f"{group[0].label} (trial {group[0].number})"
+    label = f"{group[0].label} (trial {group[0].number})"
     more = len(group) - 1
-    return f"{told} and {more} more trial{'s' if more > 1 else ''}" if more else told
+    return f"{label} and {more} more trial{'s' if more > 1 else ''}" if more else label

@@ -1,6 +1,6 @@
 """Names of swept values that are tables, such as friction models.
 
-A page has room for *lugre* and *stribeck*, not for all of their parameters, which the archive has.
+Pages show *lugre* or *stribeck* instead of all parameters, which are in the archive.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from pydantic import JsonValue
 from campaign.trial import canonical_json
 
 KINDS = ("model", "method", "kind")
-"""Entries that say what a table describes, and so come first."""
+"""Entries that state the kind of a table; its name begins with the kind."""
 
 
 def table_names(values: Sequence[JsonValue]) -> dict[str, str]:
-    """A name for each table among `values`, by its canonical JSON.
+    """Name of each table among `values`, by its canonical JSON.
 
-    What the table describes, and each number or text in which it differs from another of the same
+    The kind of the table, and each number or text that differs from another table of the same
     kind: `lugre`, or `lugre, coulomb_torque = 26`. Numbers are SI, as the tables are.
     """
     tables = {canonical_json(value): value for value in values if isinstance(value, dict)}
@@ -38,14 +38,14 @@ def table_names(values: Sequence[JsonValue]) -> dict[str, str]:
 
 
 def _told_apart(names: Mapping[str, str]) -> dict[str, str]:
-    """The same, numbered where words and six digits do not suffice."""
+    """Number equal names, where kind and six digits do not distinguish the tables."""
     count = Counter(names.values())
     numbers: Counter[str] = Counter()
-    told = {}
+    unique = {}
     for key, name in names.items():
         numbers[name] += 1
-        told[key] = f"{name} #{numbers[name]}" if count[name] > 1 else name
-    return told
+        unique[key] = f"{name} #{numbers[name]}" if count[name] > 1 else name
+    return unique
 
 
 def _same(one: JsonValue, other: JsonValue) -> bool:
@@ -57,7 +57,7 @@ def _kind(leaves: Mapping[str, JsonValue]) -> str:
 
 
 def _leaves(table: Mapping[str, JsonValue], prefix: str = "") -> Iterator[tuple[str, JsonValue]]:
-    """Dotted path and value of all that is no table."""
+    """Dotted path and value of all entries that are no tables."""
     for name, value in table.items():
         if isinstance(value, dict):
             yield from _leaves(value, f"{prefix}{name}.")

@@ -25,25 +25,25 @@ from campaign.result import Array, Axis, Cell, Column, Curve, Figure, Mark, Pane
 from campaign.signals import MultiSine
 
 NAMES = {"bristle_stiffness": "stiffness_at_rest", "damping": "damping_at_rest"}
-"""What is found below the first slip is the sum over all interfaces, and is called so."""
+"""Names here of estimates below the first slip: they are sums over all interfaces."""
 BY_TORQUE = ("stiffness_at_rest", "damping_at_rest", "inertia", "appendage_inertia")
-"""What is as wrong as the torque constant is."""
+"""Estimates with the relative error of the torque constant."""
 QUANTITIES = ("stiffness_at_rest", "damping_at_rest", "inertia")
 SPLIT = ("bristle_damping", "viscous_friction")
-"""Of which small motions tell the sum, and seldom each."""
+"""Parameters of which small motions determine the sum, but seldom each."""
 ACCURACY = 1e-4
-"""Share of the rate by which the simulation itself may be off."""
+"""Relative error of the simulation, as a share of the rate."""
 SHOWN = 2000
 """Samples of a record in a figure."""
 LAGS = 60
-"""of the autocorrelation in a figure."""
+"""Lags of the autocorrelation in a figure."""
 TIME, RATE = Axis("Time", "s", "s"), Axis("Rate", "rad/s", "mrad/s")
 
 
 def record_of(data: TrialData, period: float | None = None) -> Record:
-    """Torque and motion of a trial that begins at rest, by the best of its sensors.
+    """Torque and motion of a trial that begins at rest, from the best of its sensors.
 
-    Raises ValueError where it has none, or where the record is too short.
+    Raises ValueError without a sensor, or if the record is too short.
     """
     recording = data.recording()
     rate = next((name for name in (GYRO_RATE, RELATIVE_RATE) if name in recording.channels), None)
@@ -63,52 +63,51 @@ def record_of(data: TrialData, period: float | None = None) -> Record:
 def with_torques_known(
     trials: Sequence[TrialData], records: Sequence[Record], motions: Sequence[Array] = ()
 ) -> list[Record]:
-    """The records, with all that is known of the torque of those that a multisine shook.
+    """Records with corrected torques of the trials that a multisine excites.
 
-    That is their torque without its sensor's noise and with what it is between its samples, and
-    what it may be off by. All trials are of one bench. motions: of the load, where a fit tells
-    them.
+    The correction removes the noise of the torque sensor and adds the torque between samples and
+    the torque's uncertainty. All trials are of one bench. motions: of the load, from a fit.
     """
     commands = {
         number: command
         for number, (trial, record) in enumerate(zip(trials, records, strict=True))
         if (command := _multisine(trial)) is not None and record.at_rest
     }
-    found, doubts, moved = list(records), 0, dict(enumerate(motions))
+    corrected, doubts, moved = list(records), 0, dict(enumerate(motions))
     for step in sorted({records[number].step for number in commands}):
         alike = [number for number in commands if records[number].step == step]
         driven = [Driven(records[n].torque, commands[n].sample, moved.get(n)) for n in alike]
         highest = max(max(commands[n].frequencies) for n in alike)
-        told = driven_torques(driven, step, highest)
-        for number, (torque, doubt) in zip(alike, told, strict=True):
+        torques = driven_torques(driven, step, highest)
+        for number, (torque, doubt) in zip(alike, torques, strict=True):
             columns = np.column_stack([np.zeros((len(torque), doubts)), doubt])
-            found[number] = replace(records[number], torque=torque, doubt=columns)
-        doubts = max(doubts, *(found[number].doubts.shape[1] for number in alike))
-    found = [each.with_doubts(doubts) for each in found]
+            corrected[number] = replace(records[number], torque=torque, doubt=columns)
+        doubts = max(doubts, *(corrected[number].doubts.shape[1] for number in alike))
+    corrected = [each.with_doubts(doubts) for each in corrected]
     if not commands:
-        return found
-    for number, each in enumerate(found):
+        return corrected
+    for number, each in enumerate(corrected):
         missing, more = np.zeros(len(each.torque)), np.zeros(len(each.torque))
         if number in commands:
             bench = bench_of(trials[number].trial)
             missing, more = between_samples(each.time, commands[number], bench)
-        # By how much that is off is the same in all trials.
+        # This error is the same in all trials.
         columns = np.column_stack([each.doubts, more])
-        found[number] = replace(each, torque=each.torque + missing, doubt=columns)
-    return found
+        corrected[number] = replace(each, torque=each.torque + missing, doubt=columns)
+    return corrected
 
 
 def _multisine(data: TrialData) -> MultiSine | None:
-    """The torque that a trial was commanded, where it was a multisine."""
+    """Commanded torque of a trial, if it is a multisine."""
     task = data.trial.task
     return task.command if task.mode == "torque" and isinstance(task.command, MultiSine) else None
 
 
 def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumptions:
-    """What a bench says beforehand: a first guess of viscous friction, and its appendage.
+    """Assumptions from a bench: a first guess of viscous friction, and its appendage.
 
-    Both dampings are free: interfaces whose bristles differ yield with other shares of damping than
-    of stiffness, and only the sum of all damping is the same for them and for one bristle.
+    Both dampings are free. Interfaces with different bristles yield with different shares of
+    damping and stiffness; only the sum of all damping is the same for them and for one bristle.
     span: lowest and highest frequency of the excitation (Hz); an appendage within is fitted, too.
     """
     viscous = viscous_of(bench)
@@ -116,30 +115,30 @@ def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumptions:
         return Assumptions(viscous)
     part = bench.appendage
     free = span[0] < part.frequency < span[1]
-    told = Appendage(part.inertia, part.frequency, part.damping_ratio)
-    return Assumptions(viscous, told, appendage_free=free)
+    appendage = Appendage(part.inertia, part.frequency, part.damping_ratio)
+    return Assumptions(viscous, appendage, appendage_free=free)
 
 
 def viscous_of(bench: Bench) -> float:
-    """sigma2 at the load that a bench states, of all interfaces (N m s/rad)."""
+    """sigma2 at the load that a bench states, summed over all interfaces (N m s/rad)."""
     return sum(viscous_at_load(each, bench) for each in bench.friction.values())
 
 
 def estimates_of(found: PreslidingDynamics, bench: Bench) -> dict[str, Estimate]:
-    """The numbers by their names here, with what no repetition would show."""
-    told = {}
+    """Estimates by their names here, with uncertainties that no repetition would show."""
+    estimates = {}
     for name, estimate in found.estimates.items():
         own = replace(estimate, name=NAMES.get(name, name))
         if own.has_interval and not name.endswith("delay"):
             own = shifted_by(own, "simulation", ACCURACY * abs(own.value))
         if own.has_interval and own.name in BY_TORQUE and bench.motor is not None:
             own = with_systematic(own, bench, TORQUE_CONSTANT, own.value)
-        told[own.name] = own
-    return told
+        estimates[own.name] = own
+    return estimates
 
 
 def table_of(rows: Sequence[Mapping[str, Cell]], suffix: str = "") -> Table:
-    """One row for each record, and for all of them together."""
+    """One row per record, and one for all records together."""
     return Table(
         key=f"presliding-dynamics{suffix}",
         title="Stiffness, damping and inertia below breakaway",
@@ -159,7 +158,7 @@ def table_of(rows: Sequence[Mapping[str, Cell]], suffix: str = "") -> Table:
 
 
 def figures_of(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]) -> Iterator[Figure]:
-    """Measured and simulated motion, and what is left over."""
+    """Measured and simulated motion, and residuals."""
     largest = int(np.argmax([record.amplitude for record in found.fit.records]))
     yield _answer_figure(found, largest, suffix, trials)
     yield _left_figure(found, suffix, trials)
@@ -170,9 +169,9 @@ def _answer_figure(
 ) -> Figure:
     record, channel = found.fit.records[number], found.fit.channels[number][0]
     simulated = found.fit.answers(number)[0]
-    there = channel.there > 0
+    seen = channel.there > 0
     x = np.linspace(-1.0, 1.0, len(simulated))
-    off = np.polyfit(x[there], (channel.samples - simulated)[there], 1)
+    off = np.polyfit(x[seen], (channel.samples - simulated)[seen], 1)
     simulated = simulated + np.polyval(off, x)
     measured = np.where(channel.kept, channel.samples, np.nan)
     cut = slice(len(measured) // 2, len(measured) // 2 + SHOWN)
@@ -249,7 +248,7 @@ def _label(record: Record) -> str:
 
 
 def _autocorrelation(residuals: Array) -> Array:
-    """At lags of 1 to `LAGS` samples."""
+    """Autocorrelation at lags of 1 to `LAGS` samples."""
     energy = float(residuals @ residuals) or 1.0
     return np.array([residuals[lag:] @ residuals[:-lag] / energy for lag in range(1, LAGS + 1)])
 
@@ -262,7 +261,7 @@ def damping_figure(
     suffix: str,
     trials: tuple[int, ...],
 ) -> Figure:
-    """Damping of each record and of all, and what a rule of thumb would have made of it.
+    """Damping of each record and of all records, and the damping by a rule of thumb.
 
     amplitudes (N m), shape (n,), belong to `alone`, which may be empty: then they are a range.
     """
@@ -291,20 +290,20 @@ def damping_figure(
 
 
 def remarks(found: PreslidingDynamics) -> Iterator[str]:
-    """Notes on what a reader should know of a fit: what was refused, what goes together."""
+    """Notes on a fit: refused results and correlated parameters."""
     if found.reason:
         yield f"No interval: {found.reason}."
     for name, each in found.estimates.items():
         if name in SPLIT:
-            continue  # only their sum is asked for
+            continue  # only their sum is reported
         if each.origin in (Origin.NOT_DETERMINED, Origin.AT_BOUND) and not found.reason:
             yield f"{NAMES.get(name, name).replace('_', ' ').capitalize()}: {each.reason}."
     names, shares = found.fit.parameters.names, found.spread.correlation
     for i, one in enumerate(names):
         for j, other in enumerate(names[:i]):
             if abs(shares[i, j]) >= 0.9 and not {one, other} & {*SPLIT, "yielding"}:
-                told = [NAMES.get(n, n).replace("_", " ") for n in (other, one)]
-                yield f"{told[0]} and {told[1]} are correlated ({shares[i, j]:.3f})."
+                pair = [NAMES.get(n, n).replace("_", " ") for n in (other, one)]
+                yield f"{pair[0]} and {pair[1]} are correlated ({shares[i, j]:.3f})."
     if np.any(np.isfinite(found.spread.freedom)):
         yield (
             "The trials differ by more than their noise: intervals are from how they differ. "

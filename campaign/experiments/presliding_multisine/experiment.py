@@ -1,8 +1,8 @@
 """Presliding multisine: stiffness, damping and inertia from small motions below breakaway.
 
-The loop is open; an odd random-phase multisine of torque shakes the load on its bristles, so little
-that nothing slips, at several amplitudes. The simulation of the whole motion is fitted to all
-trials at once: unlike a torque ramp, which only shows stiffness, that measures the damping, too.
+In open loop, an odd random-phase multisine of torque moves the load on its bristles, at several
+amplitudes so small that nothing slips. The simulation of the whole motion is fitted to all trials
+at once. A torque ramp shows stiffness only; this determines the damping, too.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ from campaign.trial import Task, TrialRequest
 from campaign.units import torque_text
 
 OWN = ("amplitude", "realisation")
-"""What distinguishes the trials of one group."""
+"""Point keys that differ between trials of one group."""
 DAMPING = "damping_at_rest"
 BETWEEN_SAMPLES = 1
-"""Columns of doubt that every commanded torque has."""
+"""Columns of torque uncertainty that every commanded torque has."""
 FASTEST = 0.5
-"""of the torque at which an interface slips: above it a trial hardly is one below breakaway."""
+"""Largest amplitude over the slip torque of an interface, for a trial below breakaway."""
 
 
 def _trials(options: PreslidingMultisineOptions, bench: Bench) -> Iterator[TrialRequest]:
@@ -106,38 +106,38 @@ def _warnings(options: PreslidingMultisineOptions, bench: Bench) -> Iterable[str
 
 
 def _told(found: PreslidingDynamics, items: Sequence[TrialData]) -> dict[str, Estimate]:
-    """The numbers by name; of an imported torque with what its scale may be off by."""
-    told = estimates_of(found, bench_of(items[0].trial))
-    return told | {
-        name: with_scale(told[name], items[0], DRIVE_TORQUE)
+    """Estimates by name; those of an imported torque with its scale uncertainty."""
+    estimates = estimates_of(found, bench_of(items[0].trial))
+    return estimates | {
+        name: with_scale(estimates[name], items[0], DRIVE_TORQUE)
         for name in BY_TORQUE
-        if name in told and told[name].has_interval
+        if name in estimates and estimates[name].has_interval
     }
 
 
 def _fit(items: Sequence[TrialData]) -> PreslidingDynamics:
     records = records_of(items)
     assumed = assumed_of(bench_of(items[0].trial), span_of(items, records))
-    if any(each.doubts.shape[1] > BETWEEN_SAMPLES for each in records):  # noise was regressed away
+    if any(each.doubts.shape[1] > BETWEEN_SAMPLES for each in records):  # noise is removed
         first = first_fit(records, assumed)
         records = records_of(items, [first.answers(each)[0] for each in range(len(records))])
     return identify_presliding_dynamics(records, assumed)
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """What this trial says by itself."""
+    """Estimates of this trial alone."""
     return tuple(_told(_fit([data]), [data]).values())
 
 
 def _analyse(data: TestData) -> Result:
-    """Each place of the sweep by itself; a model is fitted to all small motions together."""
+    """Result of each place of the sweep; a model is fitted to all small motions together."""
     if data.model is not None:
         return _of_group(data, data.trials, "")
     return of_each_place(data.completed(), OWN, partial(_of_group, data))
 
 
 def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
-    """Trials of one place of the sweep, or all that a model suits."""
+    """Result of the trials of one place of the sweep, or of all that a model suits."""
     rows: list[dict[str, Cell]] = []
     notes: list[str] = []
     single: list[tuple[float, Estimate]] = []
@@ -153,18 +153,18 @@ def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result
         if own[DAMPING].has_interval:
             single.append((amplitude, own[DAMPING]))
     try:
-        found = _fit(group)
+        fit = _fit(group)
     except ValueError as error:
         text = f"No fit of all trials together: {error}."
         tables = (table_of(rows, suffix),) if rows else ()
         return Result(tables, notes=(*notes, text))
-    joint = _told(found, group)
+    joint = _told(fit, group)
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
     shown = trials_of(group)
-    figures = list(figures_of(found, suffix, shown))
-    sizes = [each.amplitude for each in found.fit.records]
-    told = [joint[name] for name in QUANTITIES if name in joint]
-    if single or (not planned and len(told) == len(QUANTITIES) and joint[DAMPING].has_interval):
+    figures = list(figures_of(fit, suffix, shown))
+    sizes = [each.amplitude for each in fit.fit.records]
+    numbers = [joint[name] for name in QUANTITIES if name in joint]
+    if single or (not planned and len(numbers) == len(QUANTITIES) and joint[DAMPING].has_interval):
         ratio = (data.model or options_of(group[0])).damping_ratio
         amplitudes = np.array([each for each, _ in single] or sizes)
         alone = [each for _, each in single]
@@ -172,12 +172,12 @@ def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result
     result = Result(
         (table_of([*rows, {"amplitude": "all", **joint}], suffix),),
         tuple(figures),
-        tuple(Finding.of(each, place) for each in told),
-        (*notes, *remarks(found)),
+        tuple(Finding.of(each, place) for each in numbers),
+        (*notes, *remarks(fit)),
     )
     if data.model is None:
         return result
-    parameters, missed, more = identified(data, found, joint, planned)
+    parameters, missed, more = identified(data, fit, joint, planned)
     return replace(
         result, tables=(*result.tables, missed), notes=(*result.notes, *more), identified=parameters
     )

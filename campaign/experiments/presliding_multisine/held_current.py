@@ -1,12 +1,12 @@
 """Torque of a drive between samples of a sampled controller.
 
-A current loop answers to each new command at once, and then flattens until the next one. Samples
-of the current are taken when a new command comes, so that a smooth curve through them lags behind
-the current: by a tenth of the controller's period and more. Were the whole current commanded, that
-would be one delay, which a fit finds. Back-EMF drives a part of it that is smooth; so the delay
-looks like damping and inertia. What is sampled of a line is the line and its images around
-multiples of the sampling rate (Oppenheim and Schafer, "Discrete-Time Signal Processing", section
-4.2); these follow from the command and from the current loop, and are taken off.
+A current loop responds to each new command at once, and then flattens until the next one. The
+current is sampled when a new command comes. A smooth curve through the samples therefore lags
+behind the current, by a tenth of the controller's period and more. If the whole current were
+commanded, that would be one delay, which a fit estimates. But back-EMF drives a smooth part of it;
+so the delay looks like damping and inertia. Samples of a line contain the line and its images
+around multiples of the sampling rate (Oppenheim and Schafer, "Discrete-Time Signal Processing",
+section 4.2). The images follow from the command and the current loop, and are removed.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from campaign.result import Array
 from campaign.signals import MultiSine
 
 IMAGES = 1000
-"""to either side: they fall with the square of their number."""
+"""Images to either side: they fall with the square of their number."""
 UNKNOWN = 0.3
-"""Share by which that may be off: gains and inductances are seldom known better."""
+"""Relative uncertainty of the images: gains and inductances are seldom known better."""
 LATE = 0.2
-"""Share of a controller's period that the current may lag behind where nobody tells its loop."""
+"""Share of a controller's period that the current may lag if its loop is unknown."""
 ALIKE = 1e-6
 """Share of a turn by which an image may miss a line and still lie on it."""
 
 
 def between_samples(time: Array, command: MultiSine, bench: Bench) -> tuple[Array, Array]:
-    """What to add to a torque measured at `time` (s), and what that may be off by, shape (n,).
+    """Torque to add to a torque measured at `time` (s), and its uncertainty, shape (n,).
 
-    command: torque (N m) that the controller holds. Both are 0 of a bench without a period. `time`
-    is even; a recording faster than the controller shows itself what is between its commands.
+    command: torque (N m) that the controller holds. Both are 0 for a bench without a period. `time`
+    is evenly spaced. A recording faster than the controller shows the current between commands.
     """
     controller = bench.controller
     if controller is None or controller.sample_rate is None:
@@ -40,7 +40,7 @@ def between_samples(time: Array, command: MultiSine, bench: Bench) -> tuple[Arra
     if motor is None or gains is None or motor.resistance is None or motor.inductance is None:
         lag = LATE / rate if _step(time) * rate > 0.99 else 0.0
         return np.zeros(len(time)), lag * command.integral(time, -1)
-    # A sensor is late by whole samples of its controller.
+    # A sensor's delay is a whole number of the controller's samples.
     late = controller.delay + round(bench.sensors.current.delay * rate) / rate
     impedance = motor.inductance, motor.resistance
     missing = -_images(time, command, gains, impedance, rate, late)

@@ -1,7 +1,7 @@
 """Parameters from small motions: stiffness, damping, inertia.
 
-What is found is the sum over all interfaces, before any of them slips: with one interface that is a
-number of the bench, with several only their sum is known, and no bench file has a place for it.
+Estimates are the sums over all interfaces, before any of them slips. With one interface, the sum is
+a number of the bench. With several, only the sum is known, and a bench file has no key for it.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ ADVICE = {
     "appendage": "shake with more lines around its frequency, or longer",
     "natural_frequency": "shake with more lines around it, or longer",
 }
-"""By the beginning of a name: what tells the number better."""
+"""What to measure for a better estimate, by the beginning of its name."""
 
 
 def identified(
@@ -58,8 +58,8 @@ def identified(
 ) -> tuple[IdentifiedRig, Table, tuple[str, ...]]:
     """Parameters, what the model leaves over of each trial, and notes.
 
-    planned: whether the trials are small motions by their plan. Raises ValueError where no trial of
-    the validation is one.
+    planned: whether the trials are planned small motions. Raises ValueError if the validation has
+    none.
     """
     bench = data.bench
     told = told | _bristle_damping(told, bench, data.model.viscous_friction)
@@ -77,7 +77,7 @@ def identified(
 
 
 def _unseen(trials: Sequence[TrialData]) -> list[Record]:
-    """Of a validation, what stays below breakaway. Raises ValueError where nothing does."""
+    """Records of a validation that stay below breakaway. Raises ValueError if there are none."""
     if not trials:
         return []
     chosen, why = usable(trials)
@@ -89,7 +89,7 @@ def _unseen(trials: Sequence[TrialData]) -> list[Record]:
 def _bristle_damping(
     told: dict[str, Estimate], bench: Bench, viscous_friction: float | None
 ) -> dict[str, Estimate]:
-    """sigma1: the damping of small motions less what is known of viscous friction."""
+    """sigma1: the damping of small motions minus the viscous friction."""
     whole = told.get("damping_at_rest")
     if whole is None:
         return {}
@@ -109,7 +109,7 @@ def _bristle_damping(
 
 
 def _interface(bench: Bench) -> str:
-    """The only interface of a bench, where it acts at the load and has bristles; else ""."""
+    """The only interface of a bench, if it acts at the load and has bristles; else ""."""
     if len(bench.friction) != 1:
         return ""
     ((name, options),) = bench.friction.items()
@@ -118,7 +118,7 @@ def _interface(bench: Bench) -> str:
 
 
 def _gives_way(found: PreslidingDynamics) -> bool:
-    """Whether the spring surely softens towards a torque, as bristles do and a spring does not."""
+    """Whether the stiffness surely falls with torque, as of bristles and not of a spring."""
     yielding = found.estimates.get("yielding")
     if yielding is None or not yielding.has_interval:
         return False
@@ -127,7 +127,7 @@ def _gives_way(found: PreslidingDynamics) -> bool:
 
 
 def _parameters(told: dict[str, Estimate], bench: Bench, bristles: bool) -> Iterator[Parameter]:
-    """`bristles`: whether what holds the load is known to be friction."""
+    """Parameters; `bristles`: whether friction is known to hold the load."""
     keys, own = dict(KEYS), _interface(bench)
     if own and bristles:
         keys["stiffness_at_rest"] = f"friction.{own}.bristle_stiffness"
@@ -190,7 +190,7 @@ def _notes(bench: Bench, found: PreslidingDynamics, planned: bool) -> Iterator[s
 
 
 def _correlations(found: PreslidingDynamics) -> dict[tuple[str, str], float]:
-    """By the names of the parameters; the damping of the bristles is the whole one's twin."""
+    """Correlations by parameter names; the bristles' damping has those of all damping."""
     names = {"bristle_stiffness": "stiffness_at_rest", "damping": "bristle_damping"}
     matrix = found.spread.correlation
     own = [names.get(each, each) for each in found.fit.parameters.names]

@@ -1,4 +1,4 @@
-"""Options of small motions below breakaway, and selection of trials with such."""
+"""Options of small motions below breakaway, and selection of such trials."""
 
 from __future__ import annotations
 
@@ -51,22 +51,22 @@ class PreslidingOptions(Options):
 
 MOTION = (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE)
 MOST_SAMPLES = 300_000
-"""of all trials together that nobody planned as small motions; the simulation follows each."""
+"""Most samples of all trials that are not planned small motions; the simulation follows each."""
 BEYOND = 2.0
-"""Corner of the low-pass over the highest frequency that the load answers to."""
+"""Corner of the low-pass over the highest frequency of the load's motion."""
 ONLY_RAMPS = 0.1
-"""of a torque that a straight line leaves over, below which it has no reversal."""
+"""Residual of a straight line over the torque (both rms) below which a torque has no reversal."""
 EXPLAINED = 0.5
-"""of the torque's variance that inertia, damping, spring and friction have to explain."""
+"""Least share of the torque's variance that inertia, damping, spring and friction explain."""
 DIRECTION = 0.5
-"""Friction that changes with the direction, over that which grows with the angle: more slides."""
+"""Largest ratio of friction by direction to friction by angle; with more, the load slides."""
 
 
 def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
-    """Trials that stay below breakaway, or why there are none.
+    """Trials that stay below breakaway, or the reason for none.
 
-    Where some were planned for it (`presliding_multisine`), these. Else what was done in open loop
-    or recorded elsewhere, as far as it comes back to where it was.
+    These are trials planned for it (`presliding_multisine`), if there are any; else open-loop
+    trials and imported recordings that return to their initial position.
     """
     shown = [
         each
@@ -76,7 +76,7 @@ def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
     planned = [each for each in shown if is_planned(each)]
     if planned:
         return planned, ""
-    found: list[TrialData] = []
+    suitable: list[TrialData] = []
     whys: list[str] = []
     samples = 0
     for each in shown:
@@ -95,9 +95,9 @@ def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
         if why := slides(record):
             whys.append(f"{record.named}: {why}")
         else:
-            found.append(each)
-    if found:
-        return found, ""
+            suitable.append(each)
+    if suitable:
+        return suitable, ""
     names = f"{DRIVE_TORQUE} and {' or '.join(MOTION)}"
     return (), f"no trial is a small motion below breakaway ({_told(whys) or f'none has {names}'})"
 
@@ -108,12 +108,12 @@ def _told(whys: Sequence[str]) -> str:
 
 
 def is_planned(data: TrialData) -> bool:
-    """Whether it is a small motion by its plan, so that nobody has to look."""
+    """Whether a trial is a small motion by its plan, so that its data need no check."""
     return data.trial.kind == "presliding_multisine"
 
 
 def small_motion(data: TrialData) -> Record:
-    """The record of a trial. Raises ValueError with the reason where it holds too little."""
+    """Record of a trial. Raises ValueError with the reason if it has too little data."""
     if is_planned(data):
         return record_of(data, 1.0 / options_of(data).lowest)
     if not data.trial.recording:
@@ -131,13 +131,13 @@ def small_motion(data: TrialData) -> Record:
         torque[piece],
         rate=None if name == RELATIVE_ANGLE else values,
         angle=values if name == RELATIVE_ANGLE else None,
-        at_rest=False,  # nobody says how a recording from elsewhere begins
+        at_rest=False,  # the initial state of an imported recording is unknown
         label=label,
     )
 
 
 def records_of(trials: Sequence[TrialData], motions: Sequence[Array] = ()) -> list[Record]:
-    """With all that is known of their torque. motions: of the load, where a fit tells them."""
+    """Records with torques of `with_torques_known`. motions: fitted motions of the load."""
     return with_torques_known(trials, [small_motion(each) for each in trials], motions)
 
 
@@ -148,7 +148,7 @@ def span_of(trials: Sequence[TrialData], records: Sequence[Record]) -> tuple[flo
 
 
 def _span(data: TrialData, record: Record) -> tuple[float, float]:
-    """That a trial shows."""
+    """Frequency range (Hz) that a trial shows."""
     if is_planned(data):
         options = options_of(data)
         return options.lowest, options.highest
@@ -156,15 +156,15 @@ def _span(data: TrialData, record: Record) -> tuple[float, float]:
 
 
 def options_of(data: TrialData) -> PreslidingMultisineOptions:
-    """Of a planned trial."""
+    """Options of a planned trial."""
     return PreslidingMultisineOptions.model_validate(data.trial.options, context={"si": True})
 
 
 def slides(record: Record) -> str:
-    """Why a record is no small motion below breakaway; empty where it is one.
+    """Why a record is no small motion below breakaway; empty if it is one.
 
-    Regression of the low-passed torque on acceleration, rate, angle and direction: bristles make
-    it grow with the angle, and sliding makes it jump with the direction.
+    Regression of the low-passed torque on acceleration, rate, angle and direction: torque on
+    bristles grows with the angle, and sliding friction jumps with the direction.
     """
     if _only_ramps(record.torque):
         return "its torque only rises or falls: without a reversal nothing shows that it returns"
@@ -175,7 +175,7 @@ def slides(record: Record) -> str:
     torque, angle, rate, acceleration = _smooth(record)
     x = np.linspace(-1.0, 1.0, len(torque))
     columns = np.column_stack([angle, np.sign(rate), rate, acceleration])
-    # Offset and drift; of an angle that is the integral of a rate, the drift is a parabola.
+    # Offset and drift; the drift of an angle integrated from a rate is a parabola.
     trend = np.linalg.qr(np.vander(x, 3))[0]
     columns = columns - trend @ (trend.T @ columns)
     torque = torque - trend @ (trend.T @ torque)
@@ -193,19 +193,19 @@ def slides(record: Record) -> str:
 
 
 def _only_ramps(torque: Array) -> bool:
-    """Whether a torque is a straight line, but for little of it."""
+    """Whether a torque is nearly a straight line."""
     x = np.linspace(-1.0, 1.0, len(torque))
     left = torque - np.polyval(np.polyfit(x, torque, 1), x)
     return bool(np.std(left) < ONLY_RAMPS * np.std(torque))
 
 
 def _smooth(record: Record) -> tuple[Array, Array, Array, Array]:
-    """Torque, angle, rate and acceleration behind one and the same low-pass without phase."""
+    """Torque, angle, rate and acceleration after the same zero-phase low-pass."""
     from scipy.signal import butter, sosfiltfilt
 
     values = record.rate if record.rate is not None else np.asarray(record.angle)
-    there = np.isfinite(values)
-    values = np.interp(record.time, record.time[there], values[there])
+    valid = np.isfinite(values)
+    values = np.interp(record.time, record.time[valid], values[valid])
     corner = min(BEYOND * record.highest_frequency() * record.step, 0.2)
     sos = butter(2, 2.0 * corner, output="sos")
     torque, values = sosfiltfilt(sos, record.torque), sosfiltfilt(sos, values)
@@ -215,7 +215,7 @@ def _smooth(record: Record) -> tuple[Array, Array, Array, Array]:
 
 
 def _not_even(data: TrialData) -> str:
-    """Why a trial is not looked at; empty where it is."""
+    """Why a trial is not examined; empty if it is."""
     task, label = data.trial.task, data.trial.label
     if data.trial.recording:
         return ""
@@ -225,13 +225,13 @@ def _not_even(data: TrialData) -> str:
 
 
 def _measured(data: TrialData) -> str:
-    """The channel of the motion: what was recorded before what was made of it."""
-    told = data.trial.recording.get("channels")
-    made = {
+    """Channel of the motion: a recorded channel, before one that was computed."""
+    channels = data.trial.recording.get("channels")
+    computed = {
         str(each.get("name"))
-        for each in (told if isinstance(told, list) else [])
+        for each in (channels if isinstance(channels, list) else [])
         if isinstance(each, dict) and each.get("how", "column") != "column"
     }
     names = data.channel_names()
     order = [each for each in (GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE) if each in names]
-    return next((each for each in order if each not in made), order[-1])
+    return next((each for each in order if each not in computed), order[-1])

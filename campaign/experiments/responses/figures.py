@@ -28,12 +28,12 @@ FITTED = (
 
 @dataclass(frozen=True)
 class FittedResponse:
-    """What is drawn on the response of one sensor.
+    """Fits drawn on the response of one sensor.
 
     Attributes:
         lines: name, frequency (Hz) and response of each, shape (n,).
         marks: of modes, on the gain.
-        value: of the function whose rest is drawn below, by Hz; None for none.
+        value: response of a fitted function by Hz, for its residuals; None for none.
     """
 
     lines: Sequence[tuple[str, Array, ComplexArray]] = ()
@@ -47,7 +47,7 @@ NOTHING = FittedResponse()
 def response_figures(
     sources: Sequence[Source], fitted: Mapping[tuple[int, Side], FittedResponse] | None = None
 ) -> Iterator[Figure]:
-    """Each response and its distortion; `fitted`: by index of the source, and sensor."""
+    """Each response and its distortion; `fitted`: by index of the source and sensor."""
     for index, source in enumerate(sources):
         for side, measured in source.responses.items():
             shown = (fitted or {}).get((index, side), NOTHING)
@@ -98,8 +98,8 @@ def panels(
     for name, at, values in lines:
         gains.append(Curve(at, DECIBEL * np.log(np.maximum(np.abs(values), 1e-300)), name, name))
         own = np.unwrap(np.angle(values))
-        there = np.interp(np.log(x), np.log(at), own)
-        own = own + 2.0 * np.pi * np.round(np.median(phase - there) / (2.0 * np.pi))
+        interpolated = np.interp(np.log(x), np.log(at), own)
+        own = own + 2.0 * np.pi * np.round(np.median(phase - interpolated) / (2.0 * np.pi))
         phases.append(Curve(at, own, name, name))
     return Panel(FREQUENCY, Axis(gain_label("Gain")), gains), Panel(FREQUENCY, PHASE, phases)
 
@@ -176,8 +176,8 @@ def decibel(values: Array | float) -> Array:
 
 
 def coherence_figure(sources: Sequence[Source]) -> Figure:
-    """Of all responses."""
-    told = [(each.name, found) for each in sources for found in each.responses.values()]
+    """Figure of the coherence of all responses."""
+    responses = [(each.name, response) for each in sources for response in each.responses.values()]
     return Figure(
         "coherence",
         "Coherence",
@@ -188,7 +188,7 @@ def coherence_figure(sources: Sequence[Source]) -> Figure:
             Panel(
                 FREQUENCY,
                 Axis("Coherence"),
-                [Curve(each.frequency, each.coherence, name, name) for name, each in told],
+                [Curve(each.frequency, each.coherence, name, name) for name, each in responses],
             ),
         ),
     )

@@ -35,20 +35,20 @@ SENSORS: Mapping[Side, tuple[str, ...]] = {
 """Channels of a side, the best first."""
 ANGLES = (RELATIVE_ANGLE, MOTOR_ANGLE)
 SHARE_TOLERANCE = 1e-6
-"""of a base frequency by which a line may lie off its multiple."""
+"""Largest deviation of a line from a multiple of the base frequency, relative to the line."""
 
 Excited = Literal["auto", "input", "reference"]
 
 
 @dataclass(frozen=True)
 class Signals:
-    """One trial: torque, what answered by side, and what came into its loop from outside.
+    """Signals of one trial: torque, answers by side, and reference of its loop.
 
     Attributes:
         rate: sample rate (Hz).
         time, torque: shape (n,); NaN where a sample was lost.
-        answers: rate or angle by side, shape (n,), at the load; `channels` says which.
-        reference: shape (n,); None where nothing is known to come from outside.
+        answers: rate or angle at the load by side, shape (n,); `channels`: its source.
+        reference: command, shape (n,); None if it is unknown or constant.
     """
 
     number: int
@@ -61,21 +61,21 @@ class Signals:
 
     @property
     def leading(self) -> Array:
-        """What was excited: the reference, or the torque where there is none, shape (n,)."""
+        """Excited signal, shape (n,): the reference, or the torque without a reference."""
         return self.torque if self.reference is None else self.reference
 
     def is_angle(self, side: Side) -> bool:
-        """Whether the answer of that side is an angle and no rate."""
+        """Whether the answer of that side is an angle, not a rate."""
         return self.channels[side] in ANGLES
 
 
 CORNERS = 100
-"""Fewest of a command that excites many frequencies. Ramps and steps have fewer: what friction does
-to their motion is no noise, and looked like modes."""
+"""Fewest corners of a command that excites many frequencies. Ramps and steps have fewer: the effect
+of friction on their motion is not noise and resembles modes."""
 
 
 def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
-    """Trials that excite, with a torque and a rate or angle that answers it."""
+    """Trials with excitation, drive torque, and rate or angle; without any, the reason."""
     moving = [
         each
         for each in trials
@@ -92,7 +92,7 @@ def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
 
 
 def _excites(task: Task) -> bool:
-    """Whether many frequencies are in a command, as far as anybody has said what it was."""
+    """Whether a command is a sine, multisine or noise; true for `recorded`, where it is unknown."""
     if task.mode not in ("rate", "torque"):
         return task.mode == "recorded"
     command = task.command
@@ -102,7 +102,7 @@ def _excites(task: Task) -> bool:
 
 
 def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
-    """Of one trial. Raises ValueError where what is excited is not known."""
+    """Signals of one trial. Raises ValueError without motion or with unknown excitation."""
     task, recording = trial.trial.task, trial.recording()
     answers, channels = _answers(recording, bench)
     if not changes(recording[DRIVE_TORQUE]):
@@ -139,7 +139,7 @@ def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
 
 
 def changes(samples: Array) -> bool:
-    """Whether a signal, shape (n,), is more than one number; lost samples do not count."""
+    """Whether a signal, shape (n,), is not constant; lost samples do not count."""
     known = samples[np.isfinite(samples)]
     return bool(known.size and np.ptp(known) > 0)
 
@@ -156,7 +156,7 @@ def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dic
                 continue
             if side == "motor":
                 if bench.ratio is None:
-                    continue  # a motor's angle says nothing of the load's without a ratio
+                    continue  # the ratio gives the angle at the load
                 samples = samples / bench.ratio
             answers[side], channels[side] = samples, name
             break
@@ -168,12 +168,12 @@ def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dic
 
 
 def whole_stretches(parts: Sequence[Array], shortest: int) -> Sequence[slice]:
-    """Where all signals have numbers, for `shortest` samples or more."""
+    """Segments of at least `shortest` samples in which all signals have numbers."""
     return whole_pieces(np.all([np.isfinite(part) for part in parts], axis=0), shortest)
 
 
 def base_frequency(frequencies: Sequence[float]) -> float:
-    """The largest of which all frequencies (Hz) are multiples; zero where there is none."""
+    """Largest common divisor of the frequencies (Hz); zero without one."""
     base = 0.0
     for each in frequencies:
         one, other = each, base
@@ -187,7 +187,7 @@ def base_frequency(frequencies: Sequence[float]) -> float:
 
 
 def repeated(trial: TrialData, excited: Excited) -> float | None:
-    """The period (s) of a recorded multisine; None where nothing repeats, and of planned trials."""
+    """Period (s) of a recorded multisine; None without repetition, and for planned trials."""
     if trial.trial.task.mode != "recorded":
         return None
     recording = trial.recording()
@@ -200,7 +200,7 @@ def repeated(trial: TrialData, excited: Excited) -> float | None:
 
 
 def found_repeating(period: float) -> str:
-    """The remark of a recording that was taken for a multisine."""
+    """Remark on a recording that is treated as a multisine."""
     return (
         f"What excites repeats every {period:.6g} s and has many lines: it is taken for a "
         "multisine of that period. `frequency_response.period` says it otherwise."
@@ -208,11 +208,11 @@ def found_repeating(period: float) -> str:
 
 
 def unused(trials: Sequence[TrialData], bench: Bench) -> Iterator[str]:
-    """Of motor sensors that nobody can use, a sentence."""
+    """Sentence on recorded motor sensors that cannot be used without a gear ratio."""
     if bench.ratio is not None:
         return
-    there = {name for trial in trials for name in trial.channel_names()}
-    if names := [name for name in SENSORS["motor"] if name in there]:
+    recorded = {name for trial in trials for name in trial.channel_names()}
+    if names := [name for name in SENSORS["motor"] if name in recorded]:
         verb = "is" if len(names) == 1 else "are"
         yield (
             f"{' and '.join(names)} {verb} not used: without `[gear]` motor and load move as one. "
@@ -223,13 +223,13 @@ def unused(trials: Sequence[TrialData], bench: Bench) -> Iterator[str]:
 SAME_SIZE = 1.1
 """Ratio of neighbouring rms below which recordings are realisations of one amplitude. Realisations
 of one command have the same rms whatever their phases, and noise and a torque loop add a few
-percent; amplitudes that are to tell friction's part differ by a quarter or more."""
+percent; amplitudes that are to show the effect of friction differ by a quarter or more."""
 
 Recorded = tuple[TrialData, Signals]
 
 
 def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]]:
-    """Groups of one rms of what was excited, the largest first; within each by number of trial.
+    """Groups of equal rms of the excited signal, the largest first; in each by trial number.
 
     A new group begins where neighbours in size differ by more than `SAME_SIZE`.
 
@@ -247,12 +247,12 @@ def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]
 
 
 def _rms(samples: Array, signal: Signals, period: float) -> float:
-    """Of the last period without its mean: before, there may be rest, or a transient."""
+    """Rms of the last period less its mean; rest or a transient may precede it."""
     return float(np.nanstd(samples[-round(period * signal.rate) :]))
 
 
 def size_of(told: Sequence[Recorded], period: float) -> str:
-    """The rms of one amplitude, in words; of a recording that of its torque: its unit is known."""
+    """Text of the rms of one amplitude; of a recording that of its torque, whose unit is known."""
     trial, first = told[0]
     mode = trial.trial.task.mode
     rms = _rms(first.torque if mode == "recorded" else first.leading, first, period)

@@ -41,33 +41,33 @@ from campaign.units import rate_text, torque_text
 
 STEADY = "steady"
 FEWEST_SINES = 6
-"""frequencies below which sines are no response."""
+"""Fewest frequencies of a response from single sines."""
 GAP = 3.0
-"""Ratio of neighbours in size from which on the smaller is none of the excited lines."""
+"""Ratio of neighbours in size above which the smaller line is not an excited one."""
 HANN_APART = 2
-"""Lines of a Hann window from which on neighbours hardly know of each other."""
+"""Distance of lines of a Hann window that are nearly uncorrelated."""
 EXCITED_SHARE = 0.03
-"""of the largest line of a reference, in amplitude, from which on a line counts as excited."""
+"""Share of the largest line of a reference (amplitude) above which a line counts as excited."""
 
 
 SIZES = ("amplitude", "rms")
-"""Names of conditions that state the amplitude of a multisine, which is measured."""
+"""Conditions that state the amplitude of a multisine; the amplitude is measured instead."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """One response, by side, and what it was measured with.
+    """Responses of one measurement by side, with their excitation.
 
     Attributes:
-        name: of it, for people.
+        name: for display.
         kind: `sines`, `multisine` or `records`.
-        excitation: what a best linear approximation belongs to, in words.
-        trials: their numbers.
+        excitation: text; a best linear approximation holds for this excitation only.
+        trials: numbers.
         responses: torque to rate at the load, by side of the sensor.
         closed: command to rate of a closed rate loop, where there is one.
-        best: what repeated multisines told besides, by side.
-        every: of how many points one is fitted to; the others know of their neighbours.
-        remarks: sentences: what could not be told, and why.
+        best: best linear approximations from repeated multisines, by side.
+        every: a fit uses one of so many points; neighbours are correlated.
+        remarks: sentences on what is not determined, and why.
     """
 
     name: str
@@ -82,13 +82,13 @@ class Source:
 
     @property
     def rms(self) -> float:
-        """Of the torque of repeated multisines (N m); zero for all else."""
+        """Rms of the torque of repeated multisines (N m); zero for other kinds."""
         return max((each.excitation.rms for each in self.best.values()), default=0.0)
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How trials are read: see the options of the method."""
+    """Settings for reading trials; see the options of `frequency_response`."""
 
     excited: Excited
     estimator: Estimator
@@ -99,25 +99,26 @@ class Reading:
 def sources(
     trials: Sequence[TrialData], bench: Bench, how: Reading
 ) -> tuple[list[Source], list[str]]:
-    """All that the trials hold, and sentences about those that hold none."""
+    """All responses of the trials, and sentences on trials without one."""
     groups: dict[tuple[str, ...], list[TrialData]] = {}
     for trial in trials:
         groups.setdefault(_key(trial, how), []).append(trial)
-    found, remarks = [], list(unused(trials, bench))
+    responses, remarks = [], list(unused(trials, bench))
     refused: dict[str, list[str]] = {}
     for (kind, *_, period), group in groups.items():
         make = {"sines": _of_sines, "multisine": _of_multisine, "records": _of_records}[kind]
         label = _label(group)
         try:
-            told, lost = _all_signals(group, bench, how)
+            recorded, lost = _all_signals(group, bench, how)
         except ValueError as error:
             refused.setdefault(str(error), []).append(label)
             continue
         remarks += lost
-        parts = {label: told}
+        parts = {label: recorded}
         if kind == "multisine":
             sized = [
-                (size_of(part, float(period)), part) for part in by_amplitude(told, float(period))
+                (size_of(part, float(period)), part)
+                for part in by_amplitude(recorded, float(period))
             ]
             parts = {f"{label}, {size}": part for size, part in sized}
             if len(sized) > 1:
@@ -125,17 +126,17 @@ def sources(
                 remarks.append(f"{label}: grouped by the recorded rms of the excitation: {sizes}.")
         for name, part in parts.items():
             try:
-                found.append(make(name, part, how))
+                responses.append(make(name, part, how))
             except ValueError as error:
                 remarks.append(f"{name}: {error}.")
     remarks += [
         f"{'; '.join(dict.fromkeys(labels))}: {error}." for error, labels in refused.items()
     ]
-    return _named_apart(found), remarks
+    return _named_apart(responses), remarks
 
 
 def _named_apart(found: Sequence[Source]) -> list[Source]:
-    """Where names are alike, with the trials: a matrix may sweep what no name tells."""
+    """Add trial numbers to equal names: a matrix may sweep values that are in no name."""
     names = [each.name for each in found]
     return [
         replace(each, name=f"{each.name}, trials {each.trials[0]} to {each.trials[-1]}")
@@ -146,7 +147,7 @@ def _named_apart(found: Sequence[Source]) -> list[Source]:
 
 
 def _key(trial: TrialData, how: Reading) -> tuple[str, ...]:
-    """Trials of the same key are one measurement."""
+    """Key of a trial; trials of the same key are one measurement."""
     task, command = trial.trial.task, trial.trial.task.command
     own = {"frequency", "seed", "realisation", "realization"}
     point = {k: v for k, v in trial.trial.point.items() if k.rsplit(".", 1)[-1] not in own}
@@ -162,44 +163,44 @@ def _key(trial: TrialData, how: Reading) -> tuple[str, ...]:
         if period is not None:
             lines = ",".join(f"{each * period:.0f}" for each in command.frequencies)
             return ("multisine", *common(SIZES), lines, f"{period:.9g}")
-    found = how.period if how.period is not None else repeated(trial, how.excited)
-    if found is not None and task.duration >= found:
-        return ("multisine", *common(SIZES), f"{found:.9g}")
+    recorded_period = how.period if how.period is not None else repeated(trial, how.excited)
+    if recorded_period is not None and task.duration >= recorded_period:
+        return ("multisine", *common(SIZES), f"{recorded_period:.9g}")
     return ("records", *common())
 
 
 def _period(command: MultiSine, duration: float) -> float | None:
-    """Of a multisine that repeats at least once; None for any other."""
+    """Period (s) of a multisine that lasts for one period or more; None for any other."""
     base = base_frequency(command.frequencies)
     return 1.0 / base if base > 0 and duration * base > 1.0 - 1e-6 else None
 
 
 def _label(group: Sequence[TrialData]) -> str:
     first = group[0].trial
-    told = [first.test]
+    parts = [first.test]
     if first.task.mode != "recorded":
-        told.append(first.task.mode)
+        parts.append(first.task.mode)
     if first.task.compensation != "none":
-        told.append(first.task.compensation)
-    return ", ".join(told)
+        parts.append(first.task.compensation)
+    return ", ".join(parts)
 
 
 def _all_signals(
     group: Sequence[TrialData], bench: Bench, how: Reading
 ) -> tuple[list[Recorded], list[str]]:
-    found, remarks = [], []
+    recorded, remarks = [], []
     for trial in group:
         try:
-            found.append((trial, signals(trial, bench, how.excited)))
+            recorded.append((trial, signals(trial, bench, how.excited)))
         except ValueError as error:
             remarks.append(f"{trial.trial.label}: {error}.")
-    if not found:
+    if not recorded:
         raise ValueError(remarks[0].split(": ", 1)[-1].rstrip("."))
-    return found, sorted(set(remarks))
+    return recorded, sorted(set(remarks))
 
 
 def _as_rates(measured: MeasuredResponse, told: Signals, side: Side) -> MeasuredResponse:
-    """An angle's response times 2 pi i f is its rate's."""
+    """Response of the rate: that of an angle times 2 pi i f."""
     if not told.is_angle(side):
         return measured
     return measured.times(np.asarray(2j * np.pi * measured.frequency))
@@ -249,7 +250,7 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
 
 
 def _steady(trial: TrialData, time: Array) -> slice:
-    """The window that is measured: the one named so, or the task's."""
+    """Samples of the measuring window: the one named `steady`, else the task's."""
     task = trial.trial.task
     named = [each for each in trial.trial.windows if each.name == STEADY]
     window = named[0] if named else Window(STEADY, *task.window)
@@ -274,7 +275,7 @@ def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
         parts = [signal.torque, *signal.answers.values()]
         if signal.reference is not None:
             parts.append(signal.reference)
-        # The last whole periods: a transient has most time to pass.
+        # The last whole periods leave most time for a transient.
         tail = slice(window.stop - periods * samples, window.stop)
         if periods < 1 or not all(np.all(np.isfinite(part[tail])) for part in parts):
             remarks.append(f"{trial.trial.label}: a period has lost samples; it is left out.")
@@ -292,8 +293,8 @@ def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
     responses: dict[Side, MeasuredResponse] = {}
     for side in kept[0][0].answers:
         answer = _stacked([(s.answers[side], t) for s, t in kept])
-        found = best_linear(torque, answer, rate, periods, lines, acts_on, reference)
-        best[side], responses[side] = found, _as_rates(found.response, kept[0][0], side)
+        linear = best_linear(torque, answer, rate, periods, lines, acts_on, reference)
+        best[side], responses[side] = linear, _as_rates(linear.response, kept[0][0], side)
     closed = None
     if told[0][0].trial.task.mode == "rate" and reference is not None:
         closed = _loop_of(kept, reference, rate, periods, lines)
@@ -312,7 +313,7 @@ def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
 
 
 def _named(best: BestLinear, trial: TrialData) -> str:
-    """The excitation in words; of a loop what came into it, too."""
+    """Text of the excitation; for a rate loop also the rms of its command."""
     torque = str(replace(best.excitation, unit=pretty_unit(axis_unit("N m"))))
     command = trial.trial.task.command
     if trial.trial.task.mode != "rate" or not isinstance(command, MultiSine):
@@ -343,15 +344,17 @@ def _stacked(parts: Sequence[tuple[Array | None, slice]]) -> Array:
 
 def _period_of(trial: TrialData, how: Reading) -> float:
     task = trial.trial.task
-    found = _period(task.command, task.duration) if isinstance(task.command, MultiSine) else None
-    return found or how.period or repeated(trial, how.excited) or task.duration
+    commanded = (
+        _period(task.command, task.duration) if isinstance(task.command, MultiSine) else None
+    )
+    return commanded or how.period or repeated(trial, how.excited) or task.duration
 
 
 def _lines(trial: TrialData, period: float, leading: Array, periods: int) -> Lines:
-    """Excited lines: those of the command, or those that stand out of what leads.
+    """Excited lines: those of the command, else the largest lines of the excited signal.
 
-    They stand out by the widest gap in size there is below the largest: what a drive distorts, or
-    a loop puts beside them, may be a tenth of what was asked.
+    The widest gap in size is their lower limit: lines from distortion of a drive, or from a loop,
+    may reach a tenth of the command.
     """
     command = trial.trial.task.command
     if isinstance(command, MultiSine):
@@ -376,8 +379,8 @@ def _of_records(name: str, told: Sequence[Recorded], how: Reading) -> Source:
     responses: dict[Side, MeasuredResponse] = {}
     for side in told[0][1].answers:
         records = _records(told, side, segment or 64, None)
-        found = welch_response(records, excited, how.estimator, segment)
-        responses[side] = _as_rates(_coherent(found), told[0][1], side)
+        measured = welch_response(records, excited, how.estimator, segment)
+        responses[side] = _as_rates(_coherent(measured), told[0][1], side)
     closed = None
     if told[0][0].trial.task.mode == "rate" and not told[0][1].is_angle("load"):
         records = _records(told, "load", segment or 64, "error")
@@ -406,7 +409,7 @@ def _what_is_excited(told: Sequence[Recorded], how: Reading) -> Excitation:
 
 
 def _records(told: Sequence[Recorded], side: Side, shortest: int, what: str | None) -> list[Record]:
-    """Stretches without a lost sample; `what`: `error` for reference less output as the input."""
+    """Segments without a lost sample; `what`: `error` takes reference less output as the input."""
     records = []
     for _, signal in told:
         if side not in signal.answers:
@@ -429,7 +432,7 @@ def _coherent(found: MeasuredResponse) -> MeasuredResponse:
 
 
 def fitted_part(source: Source, side: Side, lowest: float, highest: float) -> MeasuredResponse:
-    """What is fitted to: within the band, of neighbours that know of each other one."""
+    """Points for a fit: within the band, one of `every`; sines with added scatter by friction."""
     measured = source.responses[side].between(lowest, highest).at(slice(None, None, source.every))
     if source.kind != "sines":
         return measured

@@ -32,7 +32,7 @@ ONE_REALISATION = Cause("distortion not shown", "a single realisation does not s
 
 
 def sources_table(found: Sequence[Source]) -> Table:
-    """What each response was measured with: a best linear approximation belongs to that."""
+    """Excitation of each response, for which its best linear approximation holds."""
     rows: list[dict[str, Any]] = [
         {
             "source": each.name,
@@ -57,7 +57,7 @@ def sources_table(found: Sequence[Source]) -> Table:
 
 
 def distortion_tables(found: Sequence[Source]) -> Iterator[Table]:
-    """Of the whole band, and of each line; nothing where no repeated multisine shows any."""
+    """Distortion of the whole band and of each line; nothing if no source has any."""
     rows: list[dict[str, Any]] = []
     lines: list[dict[str, Any]] = []
     for each in found:
@@ -111,9 +111,9 @@ def distortion_tables(found: Sequence[Source]) -> Iterator[Table]:
 
 
 def distortion_of(source: Source) -> list[Estimate]:
-    """Even and odd, of the band and the first sensor; none of what tells none."""
-    found = next((each.distortion for each in source.best.values()), None)
-    return [] if found is None else list(_totals(found).values())
+    """Even and odd distortion of the band, first sensor; empty without one."""
+    distortion = next((each.distortion for each in source.best.values()), None)
+    return [] if distortion is None else list(_totals(distortion).values())
 
 
 def _totals(distortion: Distortion) -> dict[str, Estimate]:
@@ -121,8 +121,8 @@ def _totals(distortion: Distortion) -> dict[str, Estimate]:
 
 
 def _band(distortion: Distortion) -> dict[str, Estimate]:
-    found = _totals(distortion)
-    return found | {f"{name}_level": _decibels(each) for name, each in found.items()}
+    totals = _totals(distortion)
+    return totals | {f"{name}_level": _decibels(each) for name, each in totals.items()}
 
 
 def _decibels(share: Estimate) -> Estimate:
@@ -141,7 +141,7 @@ def _decibels(share: Estimate) -> Estimate:
 
 
 def _lines(best: BestLinear, distortion: Distortion) -> Iterator[dict[str, Any]]:
-    """Rows by frequency."""
+    """Rows of excited and detection lines, by frequency."""
     at = best.response.frequency
     output = np.sqrt(distortion.excited)
     rows = list(_excited(best, output))
@@ -169,7 +169,7 @@ def _lines(best: BestLinear, distortion: Distortion) -> Iterator[dict[str, Any]]
 
 def _level(level: Level, low: Array, high: Array, beside: Array, k: int) -> Estimate:
     method = "power at a line without excitation less noise"
-    # The noise that is taken off is an estimate itself: nothing is bounded below its level.
+    # The subtracted noise is an estimate: no bound lies below its level.
     most = _db(max(float(high[k]), math.sqrt(float(level.noise[k]))) / float(beside[k]))
     if not level.significant[k] or not level.rms[k] > 0:
         return Estimate(
@@ -220,5 +220,5 @@ def _excited(best: BestLinear, output: Array) -> Iterator[dict[str, Any]]:
 
 
 def _db(value: float) -> float:
-    """20 log10; NaN of what is no number."""
+    """20 log10; NaN if not finite."""
     return 20.0 * math.log10(max(value, 1e-15)) if math.isfinite(value) else math.nan

@@ -1,9 +1,9 @@
 """Sensitivity of a model-based compensation to each of its parameters (section 5.2.2.4).
 
-Stabilization under a sinusoidal base motion, with one parameter at a time of the compensation's
-friction model changed by a share of itself, in every interface of the model and both directions.
-The plant keeps its own friction. How much a parameter may be wrong before the error passes a
-threshold says how well it has to be identified, and ranks the parameters (Figure 5.14).
+Stabilization under a sinusoidal base motion. One parameter at a time of the compensation's friction
+model has a relative change, in every interface of the model and in both directions. The plant keeps
+its own friction. The change at which the error passes a threshold states how accurately a parameter
+must be identified, and ranks the parameters (Figure 5.14).
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def _varied(bench: Bench, options: SensitivityOptions, parameter: str, change: f
 
 
 def _refusals(bench: Bench, options: SensitivityOptions) -> dict[tuple[str, float], str]:
-    """Changes that the bench cannot have, and why."""
+    """Changes that the bench refuses, with the reason."""
     refused = {}
     for parameter in options.parameters:
         if not varied_paths(bench, options.compensation, parameter):
@@ -128,14 +128,14 @@ def _trials(options: SensitivityOptions, bench: Bench) -> Iterator[TrialRequest]
 
 
 def _measure(data: TrialData) -> list[Estimate]:
-    """The stabilization error; of the model alone there is no metric, only a figure."""
+    """Stabilization error; trials of the model alone have no metric, only figures."""
     if data.trial.task.mode != "rate":
         return []
     return found([error_of(measured_part(data), data.trial.task)])
 
 
 def _responses(measured: Sequence[TrialData]) -> dict[str, Response]:
-    """By parameter; the trials with the model as it is belong to every one of them."""
+    """Response by parameter; the trials with the unchanged model belong to each of them."""
     errors: dict[str, dict[float, list[Estimate]]] = {}
     for data in measured:
         for error in of_each([data], _measure, "stabilization_error"):
@@ -174,7 +174,7 @@ def _analyse(data: TestData) -> Result:
             "has a meaning then."
         )
     judged = judge(responses, limit)
-    told: dict[str, Value] = {
+    conditions: dict[str, Value] = {
         "compensation": options.compensation,
         "frequency": options.frequency,
         "acceleration": options.acceleration,
@@ -182,14 +182,14 @@ def _analyse(data: TestData) -> Result:
     findings: list[Finding] = []
     whole = len(measured) == len(data.trials) and not data.left_out
     if whole:
-        findings += sensitivity_findings(judged, told)
+        findings += sensitivity_findings(judged, conditions)
     else:
         notes.append("Thresholds and ranks are not compared: they need every trial.")
-    findings.append(Finding.of(unchanged, told))
+    findings.append(Finding.of(unchanged, conditions))
     notes += _skipped_notes(measured, options)
     return Result(
         (sensitivity_table(judged, limit, seen_through(measured[0].trial)),),
-        (*_figures(judged, limit, told, whole), *figures),
+        (*_figures(judged, limit, conditions, whole), *figures),
         tuple(findings),
         tuple(notes),
     )
@@ -198,7 +198,7 @@ def _analyse(data: TestData) -> Result:
 def _figures(
     judged: Sequence[ResponseVerdict], limit: Threshold, told: Mapping[str, Value], whole: bool
 ) -> Iterator[Figure]:
-    """Thresholds, compared with published ones where all trials are there, and all errors."""
+    """Figures of thresholds, compared with published ones if `whole`, and of all errors."""
     compensation = str(told["compensation"])
     yield from thresholds_figure(judged, limit, compensation, told if whole else None)
     yield sensitivity_figure(judged, limit, compensation)
@@ -231,7 +231,7 @@ EXPERIMENT = Experiment(
         COMPENSATION_TORQUE: "figures of the model alone",
         RELATIVE_RATE: "figure of the model alone for its parameters of sliding",
     },
-    # A model stiffer than the bristles it stands for takes away more than there is.
+    # A model that is stiffer than the bristles overcompensates.
     seeks_instability=True,
     key_numbers=(
         key("sensitivity_threshold"),

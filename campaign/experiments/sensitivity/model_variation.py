@@ -1,8 +1,8 @@
 """Output of a compensation's model with one changed parameter (Figures 5.12, 5.13).
 
-The model runs alone on a prescribed sinusoidal rate, with no plant and no loop around it: as it is,
-and with each parameter lower and higher. The parameters of presliding show around a reversal, over
-time; those of sliding show over the rate.
+The model runs alone on a prescribed sinusoidal rate, without plant and loop: unchanged, and with
+each parameter lower and higher. Presliding parameters are shown over time around a reversal,
+sliding parameters over the rate.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from campaign.signals import Sine
 from campaign.trial import Task, TrialRequest
 
 CYCLES = 1.5
-"""of the prescribed rate; the reversal that is shown is the second, when the bristles move."""
+"""Cycles of the prescribed rate; the second reversal is shown, when the bristles move."""
 AROUND = 0.05
-"""of a cycle, before and after that reversal."""
+"""Share of a cycle that is shown before that reversal; twice as much is shown after it."""
 REVERSAL = "reversal"
 CYCLE = "cycle"
 SLOW = 0.35
-"""Half width of the rate axis, as a share of the largest rate: the Stribeck effect is there."""
+"""Half width of the rate axis, as a share of the largest rate, for the Stribeck effect."""
 FAST = ("viscous_friction",)
 DYNAMIC = ("bristle_stiffness", "bristle_damping")
 
@@ -41,7 +41,7 @@ def model_trials(
     parameters: Sequence[str],
     varied: Callable[[Bench, Any, str, float], Any],
 ) -> Iterator[TrialRequest]:
-    """The model as it is, and each parameter lower and higher by `options.model_change`."""
+    """Trials of the unchanged model, and of each parameter lower and higher by `model_change`."""
     amplitude = options.acceleration / (2 * np.pi * options.frequency)
     duration = CYCLES / options.frequency
     task = Task(
@@ -57,7 +57,7 @@ def model_trials(
     for parameter, change in places:
         try:
             tree = varied(bench, options, parameter, change) if parameter else None
-        except ValueError:  # said among the skipped changes
+        except ValueError:  # a change that the bench refuses
             continue
         yield TrialRequest(
             task,
@@ -65,15 +65,15 @@ def model_trials(
             note="the model alone, at a prescribed rate",
             bench=tree,
             windows=model_windows(task),
-            requires=(),  # nothing but figures comes of it
+            requires=(),  # used in figures only
             can_use=(COMPENSATION_TORQUE, RELATIVE_RATE),
         )
 
 
 def model_windows(task: Task) -> tuple[Window, Window]:
-    """What is shown of the model's output, for its plan; for archives without any, too.
+    """Windows of the model's output, for the plan and for archived trials without windows.
 
-    The reversal after half a cycle, which is a third into its window, and one whole cycle.
+    The reversal after half a cycle, at a third of its window, and one whole cycle.
     """
     command = task.command
     frequency = command.frequency if isinstance(command, Sine) else 1.0
@@ -85,16 +85,14 @@ def model_windows(task: Task) -> tuple[Window, Window]:
 
 
 def _cut(data: TrialData, name: str) -> tuple[Window, Recording]:
-    """A window of the trial, and what was recorded in it."""
+    """A window of the trial and the recording within it."""
     windows = (*data.trial.windows, *model_windows(data.trial.task))
     window = next(each for each in windows if each.name == name)
     return window, data.recording().window(window.start, window.stop)
 
 
 def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[Figure]:
-    """Figures 5.12 and 5.13, of the trials that `model_trials` asked for, as far as they can be
-    drawn from what was recorded.
-    """
+    """Figures 5.12 and 5.13 from the trials of `model_trials`, as far as their channels allow."""
     runs: dict[str, dict[float, TrialData]] = {}
     for data in with_samples(measured):
         if data.trial.task.mode == "prescribed":
@@ -177,5 +175,5 @@ def _all(data: TrialData, share: float = 1.0) -> tuple[Axis, Any, Any]:
 
 
 def _slow(data: TrialData) -> tuple[Axis, Any, Any]:
-    """The slow part of it."""
+    """Torque over rate, with an axis of slow rates."""
     return _all(data, SLOW)

@@ -40,7 +40,7 @@ SYMBOLS = {
     for name, label in PARAMETER_LABELS.items()
     if name != "stribeck_exponent"
 }
-"""Of the parameters that are varied where a test names none."""
+"""Symbols of the parameters that a test varies by default."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Response:
 
     Attributes:
         change: shape (n,), relative.
-        errors: rad, one for each change: over its repetitions.
+        errors: rad, one for each change, over its repetitions.
         dots: every trial's (change, error), shape (m, 2).
     """
 
@@ -70,7 +70,7 @@ class Response:
 
 @dataclass(frozen=True)
 class ResponseVerdict:
-    """What one parameter's response says.
+    """Threshold and rank of one parameter.
 
     Attributes:
         threshold: smallest relative change at which the error passes, or a bound of it.
@@ -118,7 +118,7 @@ def judge(responses: Mapping[str, Response], limit: Threshold) -> tuple[Response
 
 
 def _rank(name: str, ranks: Mapping[str, int], thresholds: Mapping[str, Estimate]) -> Estimate:
-    """A place in an order: what has no interval, but neighbours that may stand in its place."""
+    """Rank without interval; its reason names parameters that may change places with it."""
     near = [
         SYMBOLS.get(other, other)
         for other, estimate in thresholds.items()
@@ -130,7 +130,7 @@ def _rank(name: str, ranks: Mapping[str, int], thresholds: Mapping[str, Estimate
 
 
 def _may_be_alike(one: Estimate, other: Estimate) -> bool:
-    """Whether what is known of two thresholds leaves their order open."""
+    """Whether the ranges of two thresholds overlap, which leaves their order open."""
     first, second = _range(one), _range(other)
     return first[0] <= second[1] and second[0] <= first[1]
 
@@ -148,7 +148,7 @@ def _range(threshold: Estimate) -> tuple[float, float]:
 def sensitivity_findings(
     judged: Sequence[ResponseVerdict], told: Mapping[str, Value]
 ) -> Iterator[Finding]:
-    """Threshold and rank of each parameter; a threshold that nothing passes is a lower bound."""
+    """Threshold and rank of each parameter; a threshold that no change passes is a lower bound."""
     for one in judged:
         where = {**told, "parameter": one.parameter}
         yield Finding.of(one.threshold, where)
@@ -204,9 +204,9 @@ def thresholds_figure(
     compensation: str,
     told: Mapping[str, Value] | None,
 ) -> Iterator[Figure]:
-    """How much each parameter may change, the most important first.
+    """Figure of the smallest inadmissible change of each parameter, the most important first.
 
-    told: conditions of the findings, but for the parameter; None where they are not compared.
+    told: conditions of the findings without the parameter; None if they are not compared.
     """
     ordered = sorted(judged, key=lambda one: one.rank.value)
     if not any(math.isfinite(one.threshold.value) for one in ordered):
@@ -274,7 +274,7 @@ def sensitivity_figure(
 
 
 def _place(one: ResponseVerdict) -> str:
-    """A parameter below an axis, with what is not to be taken from its dot."""
+    """Axis label of a parameter, with a remark on a threshold without a number."""
     if one.threshold.kind == "at least":
         return f"{one.symbol}\nnot reached"
     return one.symbol if math.isfinite(one.threshold.value) else f"{one.symbol}\nnot determined"
@@ -289,17 +289,17 @@ def _said(one: ResponseVerdict) -> str:
 
 
 def _marks(one: ResponseVerdict, limit: Threshold) -> Iterator[Mark]:
-    """The threshold, and where the error passes it, with its interval."""
+    """Marks of the threshold, and of the change at which the error passes it, with interval."""
     yield Mark(_milliradians(limit.value), y=limit.value)
-    found = one.threshold
-    if not one.passed or found.origin is Origin.NOT_DETERMINED:
+    threshold = one.threshold
+    if not one.passed or threshold.origin is Origin.NOT_DETERMINED:
         return
     response = one.response
-    # The threshold is a size: it is passed on the side where the error is at the limit there.
-    there = np.interp((-found.value, found.value), response.change, response.error)
-    sign = -1.0 if abs(there[0] - limit.value) < abs(there[1] - limit.value) else 1.0
-    yield Mark("", x=sign * found.value, y=limit.value, point=True, series="fit")
-    low, high = found.combined
+    # The threshold has no sign: take the side on which the error is closer to the limit.
+    errors = np.interp((-threshold.value, threshold.value), response.change, response.error)
+    sign = -1.0 if abs(errors[0] - limit.value) < abs(errors[1] - limit.value) else 1.0
+    yield Mark("", x=sign * threshold.value, y=limit.value, point=True, series="fit")
+    low, high = threshold.combined
     if low is not None and high is not None:
         yield Mark("passes here (95 %)", x=sign * low, until=sign * high, series="fit")
 

@@ -1,1 +1,1 @@
-"""What several experiments use. None of these modules is an experiment."""
+"""Parts that several experiments share; none of these modules is an experiment."""

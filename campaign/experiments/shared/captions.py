@@ -13,9 +13,9 @@ from campaign.units import convert
 
 
 def amount(value: float, unit: str, display: str = "", digits: int = 3) -> str:
-    """A number that was found, for a caption, `1.50 N·m`, from SI to the unit that is shown.
+    """A result for a caption, `1.50 N·m`, from SI to the display unit.
 
-    Units here and below are those of a rotary axis; told is what stands for them (`axis_kind`).
+    Units here and below are those of a rotary axis; the text has those of the axis (`axis_kind`).
     """
     if not math.isfinite(value):
         return "an unknown size"
@@ -27,7 +27,7 @@ def amount(value: float, unit: str, display: str = "", digits: int = 3) -> str:
 
 
 def setting(value: float, unit: str, display: str = "") -> str:
-    """A number that was set, for a caption, `1.5 N·m`: no digits that nobody has set."""
+    """A setting for a caption, `1.5 N·m`: up to four digits, without trailing zeros."""
     unit, display = axis_unit(unit), axis_unit(display)
     return _with_unit(f"{convert(value, unit, display or unit):.4g}", display or unit)
 
@@ -37,10 +37,10 @@ def _with_unit(text: str, unit: str) -> str:
 
 
 def surely_above(found: Estimate, level: float, spare: float = 0.0) -> bool:
-    """Whether a number is above a level: its whole interval, and by more than `spare`.
+    """Whether a number exceeds a level by more than `spare`, and its whole interval the level.
 
-    A number without an interval, as of a simulation without scatter, is by more than `spare` alone;
-    one that is not determined never is.
+    For a number without an interval, as of a simulation without scatter, `spare` alone decides.
+    False for a number that is not determined.
     """
     if found.origin is Origin.NOT_DETERMINED or not found.value - level > spare:
         return False
@@ -54,7 +54,7 @@ def listed(words: Sequence[str]) -> str:
 
 
 def sentence(text: str) -> str:
-    """With a capital letter and a full stop."""
+    """A text with a capital letter and a full stop; empty for an empty text."""
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 

@@ -17,7 +17,7 @@ from campaign.trial import Tree, canonical_json
 from campaign.units import TORQUE
 
 OF_NO_OPTION = {"average_friction": TORQUE}
-"""What a condition measures that is neither an option of its experiment nor a path of a bench."""
+"""Quantities of conditions that are neither options of their experiment nor paths of a bench."""
 COUNTED = Cause("counted", "counted")
 OF_RECORDING = Cause("describes the recording", "it describes this recording")
 
@@ -35,30 +35,30 @@ METHOD_LABELS = {
 }
 
 SHORT_LABELS = {"none": "none", "static": "static", "lugre": "LuGre", "observer": "observer"}
-"""Where little room is: under an axis, beside a dot."""
+"""Labels for narrow places: under an axis, beside a dot."""
 
 
 def method(name: object) -> str:
-    """`the LuGre model`; a bench's own name stands for itself."""
+    """`the LuGre model`; a name of the bench is unchanged."""
     return f"the {METHOD_LABELS[str(name)]}" if str(name) in METHOD_LABELS else str(name)
 
 
 def short_label(name: str) -> str:
-    """A compensation in one word where that is known; a bench's own name stands for itself."""
+    """Short label of a compensation; a name of the bench is unchanged."""
     return SHORT_LABELS.get(name, name)
 
 
 def method_label(name: str) -> str:
-    """A compensation as it is called on the page; a bench's own name stands for itself."""
+    """Label of a compensation on the page; a name of the bench is unchanged."""
     return METHOD_LABELS.get(name, name)
 
 
 def grouped(
     trials: Iterable[TrialData], own: Sequence[str] = ()
 ) -> dict[str, tuple[TrialData, ...]]:
-    """Trials by their place in the sweep, in plan order; `own` names what the sweep is not about.
+    """Trials by sweep point, in plan order, without the conditions named in `own`.
 
-    Repetitions of a place are in one group. The keys are canonical JSON of the point.
+    Repeats of a point are in one group. The keys are canonical JSON of the point.
     """
     groups: dict[str, list[TrialData]] = {}
     for data in trials:
@@ -68,15 +68,15 @@ def grouped(
 
 
 def by_value(trials: Iterable[TrialData], name: str) -> dict[float, tuple[TrialData, ...]]:
-    """Trials by a number of their points (SI), ascending; repeats together."""
-    found: dict[float, list[TrialData]] = {}
+    """Trials by a number of their points (SI), ascending; repeats are in one group."""
+    groups: dict[float, list[TrialData]] = {}
     for item in trials:
-        found.setdefault(float(str(item.trial.point[name])), []).append(item)
-    return {value: tuple(found[value]) for value in sorted(found)}
+        groups.setdefault(float(str(item.trial.point[name])), []).append(item)
+    return {value: tuple(groups[value]) for value in sorted(groups)}
 
 
 def swept(data: TestData, own: Sequence[str] = ()) -> tuple[str, ...]:
-    """Dotted paths that the test's matrix sweeps, in the order they were written."""
+    """Dotted paths that the test's matrix sweeps, in the order of the protocol."""
     paths: dict[str, None] = {}
     for item in data.trials:
         paths |= {path: None for path in item.trial.point if path not in own}
@@ -84,14 +84,14 @@ def swept(data: TestData, own: Sequence[str] = ()) -> tuple[str, ...]:
 
 
 def conditions(data: TrialData, *names: str) -> dict[str, Value]:
-    """Options of the trial by name, and its whole sweep point, for findings and table rows."""
+    """Named options of the trial and its whole sweep point, for findings and table rows."""
     options: Mapping[str, object] = data.trial.options
-    told = {name: options.get(name) for name in names} | data.trial.point
-    return {k: v for k, v in told.items() if v is None or isinstance(v, str | int | float | bool)}
+    values = {name: options.get(name) for name in names} | data.trial.point
+    return {k: v for k, v in values.items() if v is None or isinstance(v, str | int | float | bool)}
 
 
 def joined(results: Iterable[Result]) -> Result:
-    """What several analyses found, one after the other."""
+    """The results of several analyses, concatenated."""
     every = tuple(results)
     return Result(
         tuple(table for each in every for table in each.tables),
@@ -106,9 +106,9 @@ def of_each_place(
     own: Sequence[str],
     analyse: Callable[[tuple[TrialData, ...], str], Result],
 ) -> Result:
-    """What each place of the sweep shows by itself; `own` names what the sweep is not about.
+    """Joined results of each sweep point, without the conditions named in `own`.
 
-    analyse: of the trials of a place, and what goes behind keys: "" where there is one place.
+    analyse: result of the trials of a point, and the suffix of its keys: "" for a single point.
     """
     groups = grouped(trials, own).values()
     suffixes = [f"-{number}" if len(groups) > 1 else "" for number in range(1, len(groups) + 1)]
@@ -116,7 +116,7 @@ def of_each_place(
 
 
 def compensation_of(bench: Bench, name: str) -> Any:
-    """The options of a compensation. Raises ValueError where the bench has none of that name."""
+    """The options of a compensation. Raises ValueError if the bench has none of that name."""
     if name not in bench.compensation:
         named = ", ".join(bench.compensation) or "none"
         raise ValueError(f"the bench '{bench.name}' has no compensation '{name}'; it has {named}")
@@ -126,7 +126,7 @@ def compensation_of(bench: Bench, name: str) -> Any:
 def parameter_paths(
     interfaces: Mapping[str, Mapping[str, Any]], where: str, parameter: str
 ) -> dict[str, float]:
-    """Dotted path to value (SI), in every interface and direction that has a parameter."""
+    """Dotted path to value (SI) of a parameter, in every interface and direction that has it."""
     return {
         f"{where}.{name}.{prefix}{parameter}": float(table[parameter])
         for name, model in interfaces.items()
@@ -136,10 +136,10 @@ def parameter_paths(
 
 
 def with_changes(bench: Bench, changes: Mapping[str, Any]) -> Tree:
-    """The normalised bench with other values (SI) at dotted paths, for `TrialRequest.bench`.
+    """The normalized bench with other values (SI) at dotted paths, for `TrialRequest.bench`.
 
     `with_changes(bench, {"friction.load.coulomb_torque": 30.0})`. Raises ValueError, with a message
-    for the user, for a path the bench does not have and for a value it refuses there.
+    for the user, for a path that the bench does not have and for an invalid value.
     """
     tree: Tree = bench.model_dump(mode="json")
     for path, value in changes.items():

@@ -1,8 +1,8 @@
 """Default options for a bench, each with a reason.
 
-An experiment names one of these functions as its `fit`. They know the rig as it is described, not
-as it is: where friction is not described they take what the limits allow, and say so. Maps have a
-file of their own.
+An experiment names one of these functions as its `fit`. They use the described rig, not the real
+one. Without a description of friction they use what the limits allow, and state so. Maps have their
+own file, `friction_map/default_options.py`.
 """
 
 from __future__ import annotations
@@ -30,29 +30,29 @@ MILLIMETRE = 1e-3
 """m"""
 NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
 SWEPT = 40
-"""frequencies, evenly in their logarithm."""
+"""frequencies, evenly spaced in their logarithm."""
 ROOM = 0.5
-"""of the torque, for friction that is not described, noise, and what the loop overshoots."""
+"""of the torque, as a reserve for undescribed friction, noise and overshoot of the loop."""
 SAMPLES = 100
-"""a cycle: of 20 the 19th harmonic folds onto the fundamental, and turned it by 0.1 to 0.2 deg."""
+"""a cycle. With 20, the 19th harmonic aliased onto the fundamental: a phase of 0.1 to 0.2 deg."""
 PEAK = 1.8
-"""times the static torque: where a ramp or a torque sine ends."""
+"""times the static torque: peak of a ramp or a torque sine."""
 
 
 def usual(degrees: float) -> float:
-    """A usual size (SI): what is a degree where axes turn is a millimetre where they travel."""
+    """A usual size (SI): so many degrees on a rotary axis, millimeters on a linear axis."""
     return degrees * (MILLIMETRE if is_linear() else DEG)
 
 
 def torque_above_friction(choices: Choices, rig: Rig, name: str) -> float:
-    """A torque (N m) that surely moves the load, as far as the drive has it."""
+    """A torque (N m) above static friction, as far as the drive can supply it."""
     static = rig.static_torque
     friction = {} if static is None else {f"{PEAK:g} times the static torque": PEAK * static}
     return choices.least(name, "N m", {**friction, share("torque", MOST): MOST * rig.torque})
 
 
 def overcome_friction(rig: Rig) -> None:
-    """ValueError where the drive cannot move the load at all."""
+    """Raise ValueError if the drive cannot move the load."""
     static = rig.static_torque or 0.0
     if static >= MOST * rig.torque:
         raise ValueError(
@@ -62,7 +62,7 @@ def overcome_friction(rig: Rig) -> None:
 
 
 def stands_still(rig: Rig) -> None:
-    """ValueError where one count of the rate's sensor makes the loop ask for all of the torque."""
+    """Raise ValueError if the loop answers one count of the rate with the whole torque."""
     controller, per_ampere = rig.bench.controller, rig.bench.torque_per_current
     if controller is None or controller.rate is None or per_ampere is None:
         return
@@ -76,7 +76,7 @@ def stands_still(rig: Rig) -> None:
 
 
 def frequency_response(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
-    """Amplitudes within the limits, and frequencies from where they fit to where the loop ends."""
+    """Amplitudes and frequencies within the limits, up to 35 % of the controller's sample rate."""
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     amplitude, torque = options.amplitude, options.torque
     if options.loop == "closed":
@@ -124,8 +124,8 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
         )
     swept = dict.fromkeys(nice(f, "Hz", 3, up=True) for f in np.geomspace(low, highest, SWEPT))
     top = "35 % of the controller's sample rate" if control else "a usual size"
-    told = f"from {low:.2g} Hz ({why}) to {highest:.3g} Hz ({top})"
-    choices.take("frequencies", tuple(swept), told)
+    span = f"from {low:.2g} Hz ({why}) to {highest:.3g} Hz ({top})"
+    choices.take("frequencies", tuple(swept), span)
     if options.loop == "closed":
         part = ROOM if rig.static_torque is None else 1.4 * ROOM
         left = rig.accelerated_by(rig.torque - worst_friction(bench, amplitude))
@@ -144,7 +144,7 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
 
 
 def base_motion(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
-    """Acceleration of a sinusoidal base motion whose swing and rate the bench can follow."""
+    """Acceleration of a sinusoidal base motion with swing and rate within the limits."""
     if getattr(getattr(options, "motion", None), "kind", "sine") != "sine":
         return {}
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
@@ -164,9 +164,9 @@ def base_motion(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
 
 
 def _periods_in_time(choices: Choices, longest: float) -> float:
-    """Frequency (Hz) of a sine whose cycles last `longest` (s) at most: fewer of them, or faster.
+    """Frequency (Hz) of a sine whose cycles last `longest` (s) at most: fewer or faster cycles.
 
-    One cycle to settle and two that are measured are the fewest.
+    The minimum is one settling cycle and two measured cycles.
     """
     options, why = choices.options, share("duration", MOST)
     settle, cycles = options.settle_cycles, options.cycles
@@ -213,20 +213,20 @@ def step_response(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
 
 
 RAMP_TIME = 30.0
-"""s, of a torque ramp up to breakaway, at most: slow against friction's own rates."""
+"""s; longest torque ramp up to breakaway: slow against the dynamics of friction."""
 RAMP_PACES = 400.0
-"""times that sliding takes to grow e-fold, up to breakaway: its friction is then 1 % below Ts, and
+"""e-folding times of sliding in a ramp up to breakaway: its friction is then 1 % below Ts, and
 largest within some ten of them before the ramp ends."""
 PACE_SAMPLES = 40.0
-"""in which sliding grows e-fold, at least: enough for a polynomial through them."""
+"""Smallest number of samples in an e-folding time of sliding: enough for a polynomial."""
 SLIDING = 0.1
-"""of the rate limit, at most: a rate that counts as sliding."""
+"""Largest share of the rate limit that counts as sliding."""
 RUN_OUT = 4.0
-"""s; times the rate that counts as sliding, room behind a ramp for the load to be stopped in."""
+"""s; times the sliding rate, the angle reserved after a ramp to stop the load."""
 
 
 def breakaway(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
-    """Positions, height and slope of torque ramps, and what counts as sliding."""
+    """Positions, peak and slope of torque ramps, rest, and the rate that counts as sliding."""
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     overcome_friction(rig)
     sliding = _sliding(rig, options)
@@ -263,7 +263,7 @@ def breakaway(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
 def _instability(rig: Rig) -> float:
     """Time (s) in which sliding grows e-fold as friction falls up to the Stribeck velocity.
 
-    J over the slope of friction; infinite where it does not fall, or nobody says how.
+    J over the slope of friction; infinite if friction does not fall, or is not stated.
     """
     speed, inertia = rig.stribeck_velocity, rig.bench.axis.inertia
     if speed is None or inertia is None:
@@ -274,9 +274,9 @@ def _instability(rig: Rig) -> float:
 
 
 def _sliding(rig: Rig, options: Any) -> Reasons:
-    """Rate (rad/s) that counts as sliding: above the gyro's noise, and within the limits.
+    """Candidates (rad/s) for the rate that counts as sliding: above noise, within the limits.
 
-    A ramp ends at four times that, and then the load still has to be stopped.
+    A ramp ends at four times that rate; then the load must be stopped.
     """
     if "sliding_rate" in options.model_fields_set:
         return {"as written": options.sliding_rate}
@@ -309,7 +309,7 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
 
 
 def _reach(rig: Rig, options: Any, sliding: float) -> float:
-    """How far from zero (rad) a ramp may begin: it creeps, gives way, and has to be stopped."""
+    """Largest start angle (rad) of a ramp, with room for creep, sliding and stop."""
     limit, creep = rig.limits.angle, 2.0 * (rig.presliding or 0.0)
     if creep > 0.5 * limit and "positions" not in options.model_fields_set:
         raise ValueError(

@@ -24,13 +24,13 @@ CHOOSE_SINE = "where it is a sine for a while, windows name that part, or start 
 
 
 def named_or_found(offered: OfferedRecording, found: Sequence[Window]) -> tuple[Window, ...]:
-    """The windows that an analysis needs: as somebody has named them, and else as found."""
+    """The windows that an analysis needs: stated ones by name, else detected ones."""
     stated = {window.name: window for window in offered.windows}
     return tuple(stated.get(window.name, window) for window in found)
 
 
 def _stated(offered: OfferedRecording, name: str) -> Window | None:
-    """The window that somebody has named so. Raises ValueError where there are only others."""
+    """The stated window of a name. Raises ValueError if only other windows are stated."""
     names = [window.name for window in offered.windows]
     if names and name not in names:
         raise ValueError(f"a window {names[0]!r} has no meaning here; it is {name!r}")
@@ -38,9 +38,9 @@ def _stated(offered: OfferedRecording, name: str) -> Window | None:
 
 
 def _sine(offered: OfferedRecording, channel: str, window: Window | None) -> FoundStretch:
-    """The sine of a channel, at the frequency (Hz) that is known to have been set, if it is.
+    """The sine of a channel, at the stated frequency (Hz) if there is one.
 
-    Looked for in the window that was stated, or in all of the recording.
+    The search covers the stated window, or the whole recording.
     """
     known = offered.conditions.get("frequency")
     frequency = float(known) if isinstance(known, int | float) else None
@@ -64,7 +64,7 @@ def _steady(
     settle_cycles: int,
     settle_time: float,
 ) -> tuple[float, float, int]:
-    """Begin and end (s) of the whole cycles that are measured, and how many they are."""
+    """Begin and end (s) of the measured whole cycles, and their number."""
     frequency = found.sine.frequency
     if window is not None:
         return window.start, window.stop, round((window.stop - window.start) * frequency)
@@ -88,11 +88,11 @@ def sine_response(
     settle_cycles: int,
     settle_time: float,
 ) -> TrialRequest:
-    """A response to a sine of a channel. Raises ValueError where that is none."""
+    """A response to a sine of a channel. Raises ValueError if the channel is not a sine."""
     stated = _stated(offered, window)
-    found = _sine(offered, excitation, stated)
-    sine = found.sine
-    start, stop, cycles = _steady(offered, stated, found, settle_cycles, settle_time)
+    stretch = _sine(offered, excitation, stated)
+    sine = stretch.sine
+    start, stop, cycles = _steady(offered, stated, stretch, settle_cycles, settle_time)
     return TrialRequest(
         Task(
             mode=mode,
@@ -102,7 +102,7 @@ def sine_response(
             sample_rate=offered.sample_rate,
         ),
         point={"frequency": round(sine.frequency, 9)},
-        note=f"a sine of {sine.frequency:.4g} Hz was found{_where(offered, stated, found)}; "
+        note=f"a sine of {sine.frequency:.4g} Hz was found{_where(offered, stated, stretch)}; "
         f"{cycles} cycles are measured",
         requires=(GYRO_RATE, excitation),
         windows=(Window(window, start, stop),),
@@ -110,7 +110,7 @@ def sine_response(
 
 
 def _where(offered: OfferedRecording, stated: Window | None, found: FoundStretch) -> str:
-    """Where a sine is in a recording, where that is not all of it: in which window, or times."""
+    """Window or times of a sine in a recording, as text; empty for the whole recording."""
     if stated is not None:
         return f" in the window {stated.name!r}, {stated.start:.4g} to {stated.stop:.4g} s"
     whole = round(offered.duration * offered.sample_rate)
@@ -121,7 +121,7 @@ def _where(offered: OfferedRecording, stated: Window | None, found: FoundStretch
 
 
 def step_found(offered: OfferedRecording, names: tuple[str, str]) -> TrialRequest:
-    """A step of the command; windows of these names before and after it. Raises ValueError."""
+    """A step of the command, with named windows before and after. Raises ValueError for no step."""
     recording = offered.read([COMMAND])
     try:
         step = found_step(recording.time, recording[COMMAND])
@@ -152,17 +152,17 @@ def step_found(offered: OfferedRecording, names: tuple[str, str]) -> TrialReques
 
 
 def hull_sine(offered: OfferedRecording, window: str, settle_cycles: int) -> TrialRequest:
-    """A motion of the hull that is a sine. Raises ValueError where it is none."""
+    """A sinusoidal motion of the hull. Raises ValueError if it is not a sine."""
     stated = _stated(offered, window)
-    found = _sine(offered, BASE_RATE, stated)
-    sine = found.sine
-    start, stop, cycles = _steady(offered, stated, found, settle_cycles, 0.0)
+    stretch = _sine(offered, BASE_RATE, stated)
+    sine = stretch.sine
+    start, stop, cycles = _steady(offered, stated, stretch, settle_cycles, 0.0)
     omega = 2.0 * np.pi * sine.frequency
     acceleration = sine.amplitude * omega
     return TrialRequest(
         Task(
             mode="rate",
-            # The rate's derivative: a quarter of a cycle before it.
+            # The derivative leads the rate by a quarter of a cycle.
             base_acceleration=Sine(
                 amplitude=acceleration, frequency=sine.frequency, phase=sine.phase + 0.5 * math.pi
             ),
@@ -170,7 +170,7 @@ def hull_sine(offered: OfferedRecording, window: str, settle_cycles: int) -> Tri
             window=(start, stop),
             sample_rate=offered.sample_rate,
         ),
-        note=f"the hull swings at {sine.frequency:.4g} Hz{_where(offered, stated, found)}; "
+        note=f"the hull swings at {sine.frequency:.4g} Hz{_where(offered, stated, stretch)}; "
         f"{cycles} cycles are measured",
         options={
             "frequency": round(sine.frequency, 6),

@@ -33,18 +33,18 @@ PARAMETER_LABELS = {
     "stribeck_velocity": "Stribeck velocity vs",
     "stribeck_exponent": "Stribeck exponent δ",
 }
-"""Parameters as they are called on the page; the last word is the symbol."""
+"""Labels of parameters on the page; the last word is the symbol."""
 SERIES = {"stribeck": "static"}
-"""Models that are drawn like the compensation built on them; any other has its own name's look."""
+"""Models with the curve style of the compensation built on them; others have their own style."""
 
 
 def model_label(name: str) -> str:
-    """A friction model as it is called on the page."""
+    """Label of a friction model on the page."""
     return LABELS.get(name, f"{name} model")
 
 
 def model_series(name: str) -> str:
-    """The series, and so the look, of a friction model's curves."""
+    """The series, which sets the style, of a friction model's curves."""
     return SERIES.get(name, name)
 
 
@@ -60,7 +60,7 @@ def model_called(name: str) -> FrictionModel:
 def in_models(
     bench: Bench, models: Sequence[str]
 ) -> Iterator[tuple[dict[str, JsonValue], Tree | None]]:
-    """Sweep point and bench for each model; the bench as it is (None) when none is named."""
+    """Sweep point and bench for each model; without models the unchanged bench (None)."""
     if not models:
         yield {}, None
     for name in models:
@@ -68,11 +68,11 @@ def in_models(
 
 
 def with_model(bench: Bench, name: str) -> Tree:
-    """The normalised bench with every friction interface described by the model `name`.
+    """The normalized bench with every friction interface described by the model `name`.
 
-    Parameters that both models have are kept; others are dropped, and with them what scatter and
-    preload say of them. Raises ValueError, with a message for the user, for an unknown model and
-    for one that needs more than the bench says.
+    Parameters that both models have are kept. Others are dropped, with their entries in scatter and
+    preload. Raises ValueError, with a message for the user, for an unknown model and for one that
+    needs parameters that the bench does not state.
     """
     options = model_called(name).options
     tree: Any = bench.model_dump(mode="json", include={"friction"})
@@ -92,24 +92,24 @@ def with_model(bench: Bench, name: str) -> Tree:
 
 
 def _shared(given: Mapping[str, Any], options: type[Options]) -> dict[str, Any]:
-    """Those entries that the options have, in tables within them, too."""
-    found = {}
+    """Entries that the options have, also in nested tables."""
+    entries = {}
     for name, field in options.model_fields.items():
         if name in given:
             value, inner = given[name], field.annotation
             if isinstance(inner, type) and issubclass(inner, Options):
                 value = _shared(value, inner)
-            found[name] = value
-    return found
+            entries[name] = value
+    return entries
 
 
 @dataclass(frozen=True)
 class ConditionGroup:
-    """Trials that differ only in what their experiment varies itself.
+    """Trials that differ only in the conditions that their experiment varies itself.
 
     Attributes:
-        point: the rest of the sweep that they share.
-        label: the same for people; empty when there is nothing to tell apart.
+        point: their common sweep point, without those conditions.
+        label: the point as text; empty for an empty point.
     """
 
     point: dict[str, Value]
@@ -118,13 +118,13 @@ class ConditionGroup:
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Of a table that lists several places."""
+        """Columns of the point, for a table that lists several groups."""
         return tuple(
             Column(path, "Model" if path == "model" else path, exact=True) for path in self.point
         )
 
     def by(self, name: str) -> dict[float, tuple[TrialData, ...]]:
-        """Its trials by what the experiment varies as `name` (SI), ascending; repeats together."""
+        """Trials by the condition `name` (SI), ascending; repeats are in one group."""
         return by_value(self.trials, name)
 
 
@@ -132,19 +132,19 @@ OF_ONE = (
     "Without repeats an interval is of one recording: repeat the test to measure the scatter "
     "between trials. --check-step measures the error of the simulation's time step."
 )
-"""For the note of a table of such experiments."""
+"""For the note of a table of virtual experiments."""
 NONE_RESOLVED = Cause(
     "not resolved by the simulation", "it does not exceed the error of simulated friction, {error}"
 )
 RESOLVED = TORQUE_ERRORS[ENGINE]
-"""of a friction torque, that a simulation at its usual step may be off by."""
+"""of a friction torque: largest error of a simulation at its usual step."""
 
 
 def simulated(found: Iterable[Estimate]) -> tuple[Estimate, ...]:
-    """Numbers that only a simulation can know, with what its step adds: nobody has said how much.
+    """Numbers of a simulation, with a systematic part of unknown size for its time step.
 
-    No sample shows it, and no repeat. Half the step may change such a number by a thousandth, while
-    its cycles agree to the last digit.
+    Neither samples nor repeats show this part. Half the step may change such a number by a
+    thousandth, while its cycles agree to the last digit. Counts have no such part.
     """
     return tuple(
         each if each.kind == "count" else shifted_by(each, "time step of the simulation", None)
@@ -153,9 +153,9 @@ def simulated(found: Iterable[Estimate]) -> tuple[Estimate, ...]:
 
 
 def resolved(found: Estimate, friction: float) -> Estimate:
-    """A difference of simulated friction; 0 where it is no larger than the error of the engine.
+    """A difference of simulated friction; 0 if it does not exceed the error of the engine.
 
-    friction: what that error is a share of, in the unit of `found`.
+    friction: reference of the relative error `RESOLVED`, in the unit of `found`.
     """
     error = RESOLVED * friction
     if not found.is_determined or not abs(found.value) <= error:
@@ -168,15 +168,15 @@ def resolved(found: Estimate, friction: float) -> Estimate:
 def combined(
     trials: Sequence[TrialData], measure: Callable[[TrialData], Sequence[Estimate]]
 ) -> dict[str, Estimate]:
-    """The metrics of repeats, by name, as `sampled.together` puts them; of those that all have."""
+    """Metrics that all repeats have, by name, combined by `sampled_curve.together`."""
     each = [metrics(item, measure) for item in trials]
-    names = [name for name in each[0] if all(name in found for found in each)]
-    return Metrics({name: together([found[name] for found in each]) for name in names})
+    names = [name for name in each[0] if all(name in values for values in each)]
+    return Metrics({name: together([values[name] for values in each]) for name in names})
 
 
 def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[ConditionGroup, ...]:
-    """Trials by model and sweep, in plan order; `own` is what the experiment varies itself."""
-    found = []
+    """Trials by sweep point, in plan order, without the conditions `own` of the experiment."""
+    groups = []
     for group in grouped(trials, own).values():
         point: dict[str, Value] = {
             path: value
@@ -187,5 +187,5 @@ def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[ConditionGr
             model_label(str(value)) if path == "model" else f"{path} = {value}"
             for path, value in point.items()
         ]
-        found.append(ConditionGroup(point, ", ".join(words), group))
-    return tuple(found)
+        groups.append(ConditionGroup(point, ", ".join(words), group))
+    return tuple(groups)

@@ -1,9 +1,9 @@
 """A measured hull motion as a signal, from CSV text to acceleration.
 
-Whatever was measured is met exactly at every sample. A rate is a straight line from sample to
-sample, so its acceleration is a staircase; an angle is a natural-ended cubic spline, whose second
-derivative is a polyline; an acceleration is a polyline itself. Before the series, the hull is
-brought from rest to the rate with which it begins.
+The signal reproduces every measured sample exactly. A rate is linear between samples, so its
+acceleration is a staircase. An angle is a natural cubic spline, whose second derivative is a
+polyline. An acceleration is a polyline itself. Before the series, a lead-in brings the hull from
+rest to its initial rate.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ Kind = Literal["angle", "rate", "acceleration"]
 
 
 def kind_of(unit: str) -> Kind:
-    """What a column in `unit` measures, on the axis that is meant; an angle may be a position.
+    """The kind of a column in `unit`, in terms of the axis; an angle may be a position.
 
-    Raises ValueError naming the units there are.
+    Raises ValueError with the allowed units.
     """
     return name_of(unit, KINDS, "a motion")  # type: ignore[return-value]
 
 
 def name_of(unit: str, quantities: Mapping[str, Quantity], what: str) -> str:
-    """Which of some quantities has a unit. Raises ValueError, for a unit of `what`, for none."""
+    """Name of the quantity that has a unit. Raises ValueError, about a unit of `what`, for none."""
     for name, quantity in quantities.items():
         try:
             quantity.parse(f"1 {unit}")
@@ -67,12 +67,12 @@ class SeriesFile(Options):
     @property
     @abstractmethod
     def quantity(self) -> Quantity:
-        """What the values are. Raises ValueError naming the units there are."""
+        """Quantity of the values. Raises ValueError with the allowed units."""
 
     @model_validator(mode="after")
     def _readable(self, info: ValidationInfo) -> Self:
         if isinstance(info.context, Mapping) and info.context.get("si"):
-            return self  # it was read once, and here nobody need know of which axis
+            return self  # already read; here the kind of the axis is not known
         TIME.parse(f"1 {self.time}")
         _ = self.quantity
         if self.file.text is not None:
@@ -80,7 +80,7 @@ class SeriesFile(Options):
         return self
 
     def check(self, time: Array, value: Array) -> None:
-        """Raises ValueError where the series is not as it has to be."""
+        """Raise ValueError if the series is not valid."""
 
     def samples(self) -> tuple[Array, Array]:
         """Times (s, from 0) and values (SI), each shape (n,)."""
@@ -101,8 +101,8 @@ def read_table(
 ) -> tuple[Array, Array]:
     """Times (s, from 0) and values (SI), each shape (n,), of a CSV text with a header line.
 
-    Separated by commas, or by semicolons where the header has any; empty lines and lines that
-    begin with # are left out. Raises ValueError with `name` and line for whatever is wrong.
+    The separator is a comma, or a semicolon if the header has one. Empty lines and lines that begin
+    with # are skipped. Raises ValueError with `name` and line for any error.
 
     Args:
         wanted: headers of the time and of the values.
@@ -116,8 +116,8 @@ def read_table(
     for column in wanted:
         if columns.count(column) != 1:
             how = "no column" if column not in columns else "more than one column"
-            there = ", ".join(columns) or "none"
-            raise ValueError(f"{name}:{line}: {how} '{column}'; the columns are {there}")
+            headers = ", ".join(columns) or "none"
+            raise ValueError(f"{name}:{line}: {how} '{column}'; the columns are {headers}")
         places.append(columns.index(column))
     times: list[float] = []
     values: list[float] = []
@@ -137,10 +137,10 @@ def read_table(
 
 
 def motion_signal(time: Array, value: Array, kind: Kind, lead_in: float) -> Polyline:
-    """Acceleration of the hull (rad/s^2) that makes the series happen from `lead_in` (s) on.
+    """Acceleration of the hull (rad/s^2) that produces the series from `lead_in` (s) on.
 
-    An acceleration says nothing about the rate it begins with: the one that makes the mean rate of
-    the series zero is taken, as of a hull that swings.
+    An acceleration does not determine the initial rate: its value makes the mean rate of the series
+    zero, as for a swinging hull.
     """
     if kind == "rate":
         slope = np.diff(value) / np.diff(time)
@@ -154,7 +154,7 @@ def motion_signal(time: Array, value: Array, kind: Kind, lead_in: float) -> Poly
     else:
         steps = np.diff(time)
         rate = np.concatenate([[0.0], np.cumsum(0.5 * steps * (value[1:] + value[:-1]))])
-        # The mean over time of a rate that is a parabola between the samples.
+        # Mean within each step, of a rate that is a parabola between samples.
         parabola = rate[:-1] + steps * (2 * value[:-1] + value[1:]) / 6
         knots, levels, first = time, value, -float(np.sum(steps * parabola) / time[-1])
     ramp = first / lead_in if lead_in > 0 else 0.0

@@ -1,8 +1,8 @@
 """Odd random-phase multisines, sized for motion below breakaway.
 
-A sum of odd multiples of a lowest frequency, in random phases and all of one size: even distortion
-of what is excited falls between its lines (Pintelon and Schoukens, "System Identification: A
-Frequency Domain Approach", 2nd ed., section 5.2).
+A sum of odd multiples of a lowest frequency, with random phases and equal amplitudes. Even
+distortion falls between its lines (Pintelon and Schoukens, "System Identification: A Frequency
+Domain Approach", 2nd ed., section 5.2).
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from campaign.physics.bench import Bench
 from campaign.signals import MultiSine
 
 MOST_LINES = 1000
-"""of a multisine."""
+"""Largest number of lines of a multisine."""
 PER_PERIOD = 16
-"""Points per period of the highest line, at which the peak is looked for."""
+"""Points per period of the highest line, for the search of the peak."""
 SHARES = (0.05, 0.1, 0.2)
-"""of the torque at which the first interface slips when it is applied slowly."""
+"""of the slowly applied torque at which the first interface slips."""
 OF_STATIC = (0.02, 0.04, 0.08)
-"""of the static torque, where nobody has told how the friction gives way."""
+"""of the static torque, if the bench does not state its presliding."""
 BELOW, ABOVE = 25.0, 5.0
-"""Lowest and highest line, below and above the natural frequency of the load on its bristles."""
+"""Factors of lowest and highest line below and above the natural frequency on the bristles."""
 PER_LINE = 8.0
-"""Samples per period of the highest line, at least."""
+"""Smallest number of samples per period of the highest line."""
 
 
 def odd_multisine(peak: float, lowest: float, highest: float, seed: tuple[int, ...]) -> MultiSine:
-    """Odd multiples of `lowest` up to `highest` (Hz), with this largest value, from 0 at time 0.
+    """Odd multiples of `lowest` up to `highest` (Hz), with this peak, from 0 at time 0.
 
-    Phases follow from the seed. Beginning and end of whole periods lie at a passage through 0, so
-    that a bench at rest is not jerked. Raises ValueError for no line, or too many.
+    Phases follow from the seed. Whole periods begin and end at a zero crossing, so that a bench at
+    rest gets no jerk. Raises ValueError for no line, or too many.
     """
     count = int((highest / lowest * (1.0 + 1e-9) + 1.0) // 2)
     if not 1 <= count <= MOST_LINES:
@@ -59,7 +59,7 @@ def odd_multisine(peak: float, lowest: float, highest: float, seed: tuple[int, .
 
 
 def _course(count: int, phases: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], float]:
-    """One period of the sum, and the share of it at which it first passes 0."""
+    """One period of the sum, and the share of the period at which it first passes 0."""
     points = PER_PERIOD * 2 * count
     spectrum = np.zeros(points // 2 + 1, dtype=complex)
     spectrum[1 : 2 * count : 2] = np.exp(1j * (phases - 0.5 * np.pi))
@@ -75,7 +75,7 @@ def _course(count: int, phases: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, A
 def first_slip(bench: Bench) -> tuple[float, float] | None:
     """Torque (N m) at which the first interface slips, and stiffness of all (N m/rad), at the load.
 
-    None where an interface says nothing of its presliding.
+    None if the presliding of an interface is not stated.
     """
     known = [each for each in bristles(bench) if each is not None]
     if not known or len(known) < len(bench.friction):
@@ -85,17 +85,17 @@ def first_slip(bench: Bench) -> tuple[float, float] | None:
 
 
 def below_breakaway(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
-    """Amplitudes and frequencies of a multisine, as the bench's bristles suggest them."""
+    """Amplitudes and frequencies of a multisine, from the bench's bristles."""
     choices, rig = Choices(options), Rig(bench)
     slip, inertia, static = first_slip(bench), bench.axis.inertia, rig.static_torque
     if slip is not None:
         sizes = tuple(nice(share * slip[0], "N m") for share in SHARES)
-        told = ", ".join(f"{100 * share:.0f}" for share in SHARES)
-        choices.take("amplitudes", sizes, f"{told} % of the torque at which an interface slips")
+        percents = ", ".join(f"{100 * share:.0f}" for share in SHARES)
+        choices.take("amplitudes", sizes, f"{percents} % of the torque at which an interface slips")
     elif static is not None:
         sizes = tuple(nice(share * static, "N m") for share in OF_STATIC)
-        told = ", ".join(f"{100 * share:.0f}" for share in OF_STATIC)
-        choices.take("amplitudes", sizes, f"{told} % of the static torque")
+        percents = ", ".join(f"{100 * share:.0f}" for share in OF_STATIC)
+        choices.take("amplitudes", sizes, f"{percents} % of the static torque")
     rate = choices.sample_rate(rig)
     if slip is not None and inertia is not None:
         natural = math.sqrt(slip[1] / inertia) / (2.0 * math.pi)

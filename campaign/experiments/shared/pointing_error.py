@@ -1,7 +1,7 @@
 """Pointing error of a trial under base motion: windows and metric.
 
-Several experiments measure it. Their analyses build on the metric, which is archived with a trial;
-samples are read for figures.
+Several experiments measure it. Their analyses use the metric, which is archived with a trial.
+Samples are read for figures only.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from campaign.trial import Task, Trial
 from campaign.units import AngularAcceleration, Frequency
 
 MEASURED = "measured"
-"""The window that counts: after the transient; whole cycles of a sinusoidal motion."""
+"""Window of the metric: after the transient; whole cycles of a sinusoidal motion."""
 SHOWN = "shown"
-"""The beginning of it that time histories show."""
+"""Beginning of the measured window, for time histories."""
 SHOWN_CYCLES = 1.5
 """of the base motion in a time history; more cycles only make the reversals smaller."""
 SHOWN_TIME = 60.0
 """s; of a motion that is not sinusoidal."""
 ROUNDING = 1e-6
-"""of a cycle: what times may be off whole cycles by their rounding."""
+"""of a cycle: tolerance of whole cycles for rounded times."""
 
 
 class SineMotionOptions(Options):
@@ -62,7 +62,7 @@ class SineMotionOptions(Options):
 def rest_task(
     compensation: str, start: float, stop: float, sample_rate: float, **signals: Any
 ) -> Task:
-    """A task whose rate command is zero, measured from start to stop (s); what acts on the load."""
+    """A task with a zero rate command, measured from start to stop (s); signals act on the load."""
     return Task(
         mode="rate",
         compensation=compensation,
@@ -74,7 +74,7 @@ def rest_task(
 
 
 def windows_of(task: Task) -> tuple[Window, Window]:
-    """The windows of a trial under base motion, for its plan; for archives without any, too."""
+    """Windows of a trial under base motion, for plans and for archives without windows."""
     start, stop = task.window
     signal = task.base_acceleration
     shown = SHOWN_CYCLES / signal.frequency if isinstance(signal, Sine) else SHOWN_TIME
@@ -89,14 +89,14 @@ def window_of(trial: Trial, name: str) -> Window:
 
 
 def measured_part(data: TrialData) -> Recording:
-    """What was recorded in the window that counts."""
+    """The part of the recording in the measured window."""
     window = window_of(data.trial, MEASURED)
     return data.recording().window(window.start, window.stop)
 
 
 def whole_cycles_shown(trial: Trial) -> Window:
-    """What is shown, on to the end of its last cycle where that is measured, or back to the one
-    before; as it is for a motion without cycles, or measured for less than one.
+    """The shown window, extended to whole cycles as far as these are measured, else shortened;
+    unchanged for a motion without cycles, or measured for less than one cycle.
     """
     shown, measured = window_of(trial, SHOWN), window_of(trial, MEASURED)
     signal = trial.task.base_acceleration
@@ -110,9 +110,9 @@ def whole_cycles_shown(trial: Trial) -> Window:
 
 
 def largest_of(samples: Array) -> float:
-    """The farthest (rad) that what is measured, shape (n,), gets from its mean.
+    """Largest deviation (rad) of the measured samples, shape (n,), from their mean.
 
-    That is whole cycles of a sinusoidal motion: of a part of one the mean is another.
+    The samples are whole cycles of a sinusoidal motion: a partial cycle would shift the mean.
     """
     return float(np.max(np.abs(samples - np.mean(samples))))
 
@@ -123,7 +123,7 @@ def rate_of(recording: Recording) -> float:
 
 
 def error_of(recording: Recording, task: Task) -> Estimate:
-    """Stabilization error of the measured part: by its cycles, or by blocks without such."""
+    """Stabilization error of the measured part: over cycles, or over blocks without cycles."""
     samples, signal = recording[POINTING_ERROR], task.base_acceleration
     if len(samples) > 1 and isinstance(signal, Sine):
         return stabilization_error.over_cycles(samples, rate_of(recording) / signal.frequency)
@@ -131,7 +131,7 @@ def error_of(recording: Recording, task: Task) -> Estimate:
 
 
 def found(estimates: Iterable[Estimate]) -> list[Estimate]:
-    """Those with a number, as an archive keeps them."""
+    """Estimates with a finite value, for the archive."""
     return [estimate for estimate in estimates if np.isfinite(estimate.value)]
 
 
@@ -139,12 +139,12 @@ Measure = Callable[[TrialData], Sequence[Estimate]]
 
 
 def of_each(group: Iterable[TrialData], measure: Measure, name: str) -> list[Estimate]:
-    """One metric of each trial that has it, in order. Raises what `measure` raises."""
+    """One metric of each trial that has it, in order. Raises the errors of `measure`."""
     by_trial = (metrics(data, measure) for data in group)
     return [by_name[name] for by_name in by_trial if name in by_name]
 
 
 def seen_through(trial: Trial) -> str:
-    """A sentence for a table of errors, where the bench sees them through a high-pass."""
+    """Sentence for a table of errors on the bench's high-pass; empty without one."""
     corner = pointing_high_pass(bench_of(trial))
     return f" The bench sees it through a high-pass at {corner:.3g} Hz." if corner > 0 else ""

@@ -16,7 +16,7 @@ AnyOptions = TypeVar("AnyOptions", bound=Options)
 
 
 def nothing_to_plan(options: Options, bench: Bench) -> Iterable[TrialRequest]:
-    """Raises ValueError: nobody plans such trials."""
+    """Raise ValueError: such trials are recorded, not planned."""
     raise ValueError(
         "trials of this kind are recorded, so there is nothing to plan: add [[test.recording]] and "
         "run `campaign import`"
@@ -30,11 +30,11 @@ def of_any_motion(
     suits: Suits,
     identify: Callable[[TestData, AnyOptions], Result],
 ) -> Experiment:
-    """An experiment that identifies from any motion, and whose model has its name and options.
+    """An experiment that identifies from any motion; its model has its name and options.
 
     Args:
-        identify: the result with the options of the model, or else of the recorded test. Raises
-            ValueError where there is none; a report then gets a note.
+        identify: result for the options of the model, or else of the recorded test. Raises
+            ValueError if there is none; a report then has a note.
     """
 
     def analyse(data: TestData) -> Result:
@@ -45,11 +45,11 @@ def of_any_motion(
             return Result(notes=(f"{why}.",))
         own = options.model_validate(trials[0].trial.options, context={"si": True})
         try:
-            found = identify(replace(data, trials=tuple(trials)), own)
+            result = identify(replace(data, trials=tuple(trials)), own)
         except ValueError as error:
             return Result(notes=(f"{error}.",))
-        warnings = (each.text for each in found.identified.warnings)
-        return replace(found, notes=(*warnings, *found.notes))
+        warnings = (each.text for each in result.identified.warnings)
+        return replace(result, notes=(*warnings, *result.notes))
 
     return Experiment(
         name,

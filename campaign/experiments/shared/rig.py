@@ -1,6 +1,6 @@
-"""Facts of a bench that size an experiment.
+"""Quantities of a bench that size an experiment.
 
-Where friction is not described its sizes are None, and whoever asks takes what the limits allow.
+Without a description of friction its sizes are None; the caller uses what the limits allow.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from campaign.units import rate_text
 SLOW = 1e-9
 """rad/s; friction at this rate is that of the onset of sliding."""
 UNKNOWN_OVERSHOOT = 1.5
-"""of a loop whose margins nobody knows: a phase margin of 39 deg."""
+"""of a loop with unknown margins: a phase margin of 39 deg."""
 MOST = 0.9
-"""of a limit that an experiment may use up by its own choice."""
+"""Share of a limit that the default options of an experiment may use."""
 
 
 def bristles(bench: Bench) -> Iterator[tuple[float, float] | None]:
-    """Of each interface Ts / sigma0 (rad) and sigma0 (N m/rad), at the load; None where unknown."""
+    """Ts / sigma0 (rad) and sigma0 (N m/rad) of each interface, at the load; None if unknown."""
     for options in bench.friction.values():
         declared = friction_models()[options.model].small_signal
         stuck = None if declared is None else declared(options).stuck
@@ -44,7 +44,7 @@ def bristles(bench: Bench) -> Iterator[tuple[float, float] | None]:
 
 @dataclass(frozen=True)
 class Rig:
-    """A bench as the sizes of an experiment follow from it; SI, at the load."""
+    """Sizes of an experiment that follow from a bench; SI, at the load."""
 
     bench: Bench
 
@@ -55,7 +55,7 @@ class Rig:
 
     @cached_property
     def presliding(self) -> float | None:
-        """Largest Ts / sigma0 of its interfaces (rad): friction's memory is some of these."""
+        """Largest Ts / sigma0 of its interfaces (rad); the memory of friction is a few of these."""
         known = (each for each in bristles(self.bench) if each is not None)
         return max((span for span, _ in known), default=None)
 
@@ -80,15 +80,15 @@ class Rig:
         return max(periods, default=None)
 
     def unwinding(self, speed: float, static_torque: float | None = None) -> float:
-        """Angle (rad) that a stuck load lags at a reversal until the loop has turned its torque.
+        """Angle (rad) that a stuck load lags at a reversal until the loop has reversed its torque.
 
-        From -Ts to Ts, of which the proportional gain gives Kp v at once: the integral needs
-        (2 Ts / (N Kt) - Kp v) / Ki. 0 without an integral, which then never breaks it away, and
-        where nobody says how large it is.
+        The torque goes from -Ts to Ts; the proportional gain gives Kp v at once, the integral needs
+        (2 Ts / (N Kt) - Kp v) / Ki. 0 without an integral, which then never breaks the load away,
+        and without a stated controller or torque per current.
 
         Args:
             speed: of the run (rad/s).
-            static_torque: one that was found (N m), in place of the bench's.
+            static_torque: an estimate (N m), in place of the bench's.
         """
         controller, per_ampere = self.bench.controller, self.bench.torque_per_current
         if controller is None or controller.rate is None or per_ampere is None:
@@ -99,7 +99,7 @@ class Rig:
         return left / gains.integral_gain if gains.integral_gain > 0 else 0.0
 
     def turned_within(self, angle: float) -> float:
-        """Lowest speed (rad/s) at which `unwinding` is an angle (rad) at most."""
+        """Lowest speed (rad/s) at which `unwinding` does not exceed an angle (rad)."""
         controller = self.bench.controller
         whole = self.unwinding(0.0)
         if controller is None or controller.rate is None or whole <= angle:
@@ -108,27 +108,27 @@ class Rig:
 
     @property
     def limits(self) -> LimitsOptions:
-        """Raises IncompleteBenchError where the bench has none: nobody plans a motion then."""
+        """Limits of the bench. Raises IncompleteBenchError if it has none."""
         return limits_of(self.bench)
 
     @property
     def torque(self) -> float:
-        """What the limits of torque and current leave the drive (N m).
+        """Torque that the limits of torque and current allow the drive (N m).
 
-        The current counts where the bench says how much torque an ampere is.
+        The limit of current counts only if the bench states the torque per current.
         """
         limits, per_ampere = self.limits, self.bench.torque_per_current
         return min(limits.torque, math.inf if per_ampere is None else limits.current * per_ampere)
 
     def accelerated_by(self, torque: float) -> float:
-        """What a torque (N m) does to a free load (rad/s^2), beside a limit of acceleration.
+        """Acceleration of a free load by a torque (N m), in rad/s^2.
 
-        Infinite where nobody says how heavy the load is: that limit alone counts then.
+        Infinite if the bench states no inertia: then the limit of acceleration alone counts.
         """
         return math.inf if self.bench.axis.inertia is None else torque / self.bench.axis.inertia
 
     def acceleration(self, rate: float) -> float:
-        """Largest (rad/s^2) that limits and friction leave up to `rate` (rad/s), with a margin."""
+        """Largest acceleration (rad/s^2) within limits and friction up to `rate`, with a margin."""
         left = MOST * self.torque - worst_friction(self.bench, rate)
         if left <= 0.0:
             return 0.0
@@ -136,9 +136,9 @@ class Rig:
 
     @property
     def rate_noise(self) -> float:
-        """Standard deviation of a sample of the rate, quantisation included (rad/s); 0 for none.
+        """Standard deviation of a rate sample (rad/s), with quantization; 0 for an ideal sensor.
 
-        Of a rate that is made of the encoder: of the filtered difference of two angles.
+        For a rate of the encoder: that of the filtered difference of two angles.
         """
         bench, controller = self.bench, self.bench.controller
         gyro, encoder = (
@@ -154,10 +154,10 @@ class Rig:
 
     @property
     def rate_left(self) -> float:
-        """The rate limit (rad/s), less what the watched rate shows of its sensor alone.
+        """The rate limit (rad/s), less the sensor noise of the watched rate.
 
-        Six deviations of the encoder's noise and one count, in the mean that the limit watch takes:
-        the difference of two angles over its time. ValueError where nothing is left.
+        The noise is six deviations of the encoder and one count, over the time of the limit watch,
+        which takes the difference of two angles. Raises ValueError if nothing remains.
         """
         limits, encoder = self.limits, self.bench.sensors.encoder
         shown = 6.0 * math.sqrt(2.0) * encoder.noise + encoder.resolution
@@ -182,15 +182,15 @@ class Rig:
 
     @property
     def rate_step(self) -> float:
-        """One count of the rate as a sample shows it (rad/s), behind the filter of an encoder's."""
+        """One count of a rate sample (rad/s); for a rate of the encoder after its filter."""
         if self.bench.rate_is_of_encoder:
             return rate_steps(self.bench).get("encoder", 0.0)
         return self.bench.sensors.gyro.resolution
 
     def rate_count(self, omega: float) -> float:
-        """One count (rad/s) of a rate that swings with `omega` (rad/s); 0 where noise smooths it.
+        """One count (rad/s) of a rate that swings with `omega` (rad/s); 0 if noise smooths it.
 
-        An encoder counts the angle, which swings by the rate over omega.
+        An encoder counts the angle, whose amplitude is that of the rate over omega.
         """
         encoder, gyro = self.bench.sensors.encoder, self.bench.sensors.gyro
         sensor = encoder if self.bench.rate_is_of_encoder else gyro
@@ -198,7 +198,7 @@ class Rig:
         return count * omega if self.bench.rate_is_of_encoder else count
 
     def slowest_seen(self, longest: float) -> float:
-        """Lowest rate (rad/s) that its sensor tells in half of a run of `longest` (s)."""
+        """Lowest rate (rad/s) that its sensor resolves in half of a run of `longest` (s)."""
         sensors = self.bench.sensors
         if self.bench.rate_is_of_encoder:
             return 30.0 * sensors.encoder.resolution / (0.5 * longest)
@@ -206,15 +206,15 @@ class Rig:
 
     @property
     def sample_rate(self) -> float:
-        """Of a recording (Hz): 1 kHz, or the controller's where that is lower."""
+        """Sample rate of a recording (Hz): 1 kHz, or the controller's if that is lower."""
         return min(1000.0, control_rate(self.bench) or 1000.0)
 
     @cached_property
     def loop_time(self) -> float | None:
-        """How long (s) the rate loop takes to forget: ten of its slower time constants.
+        """Settling time (s) of the rate loop: ten of its slower time constants.
 
-        By its crossover, or what follows from inertia, torque constant, ratio and gain where the
-        bench says too little for that; None where it does not even say those.
+        The fast one follows from the crossover, or from inertia, torque constant, ratio and gain if
+        the bench is incomplete; None if it does not state those.
         """
         controller = self.bench.controller
         if controller is None or controller.rate is None:
@@ -228,7 +228,7 @@ class Rig:
         return None if fast is None else 10.0 * max(fast, min(slow, 1.0))
 
     def _response_time(self, proportional: float) -> float | None:
-        """J / (N Kt Kpv) (s): of a loop whose motor is not known; 0 where all of it is known."""
+        """J / (N Kt Kpv) (s) of a loop with an incomplete bench; 0 for a complete bench."""
         inertia, per_ampere = self.bench.axis.inertia, self.bench.torque_per_current
         if not lacking(self.bench):
             return 0.0  # a loop without a crossover

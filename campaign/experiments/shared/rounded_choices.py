@@ -13,12 +13,12 @@ from campaign.experiments.shared.rig import Rig
 from campaign.units import convert, factor
 
 Reasons = Mapping[str, float]
-"""Sizes (SI) by the reason that asks for them."""
+"""Sizes (SI) by reason."""
 
 
 @dataclass
 class Choices:
-    """What is chosen for the options of one test; those that it writes stay as they are."""
+    """Values chosen for the options of one test; options written in the protocol are kept."""
 
     options: Any
     told: dict[str, ChosenValue] = field(default_factory=dict)
@@ -34,14 +34,14 @@ class Choices:
         return float(self.take(name, nice(reasons[why], unit, up=True), why))
 
     def take(self, name: str, value: Any, why: str) -> Any:
-        """What the option will be: as written, or `value`."""
+        """Value of the option: as written, or `value` with its reason."""
         if name in self.options.model_fields_set:
             return getattr(self.options, name)
         self.told[name] = ChosenValue(value, why)
         return value
 
     def sample_rate(self, rig: Rig) -> float:
-        """Of the recording (Hz)."""
+        """Sample rate of the recording (Hz)."""
         return float(self.take("sample_rate", rig.sample_rate, "the controller's own rate"))
 
 
@@ -51,7 +51,7 @@ def share(limit: str, part: float) -> str:
 
 
 def nice(value: float, unit: str, digits: int = 2, *, up: bool = False) -> float:
-    """SI value with few digits in the unit that people read; towards zero, or away from it."""
+    """SI value rounded to few digits in `unit`, towards zero, or away from it (`up`)."""
     si, unit = axis_unit(SI.get(unit, unit)), axis_unit(unit)
     shown = float(convert(value, si, unit))
     if shown == 0.0 or not math.isfinite(shown):
@@ -63,4 +63,4 @@ def nice(value: float, unit: str, digits: int = 2, *, up: bool = False) -> float
 
 
 SI = {"deg": "rad", "deg/s": "rad/s", "deg/s^2": "rad/s^2"}
-"""Display units used here, of a rotary axis, and what they are inside; the others are SI."""
+"""Display units used here, of a rotary axis, with their SI units; the others are SI."""

@@ -20,22 +20,22 @@ BENCH = "bench."
 
 
 def quantity_of(path: str, trial: Trial, options: type[Options]) -> Quantity | None:
-    """What a swept number is; None for a number without unit, and for anything else."""
+    """The quantity of a swept value; None for a number without unit and other values."""
     if path.startswith(BENCH):
         at = number_at(bench_of(trial), path.removeprefix(BENCH))
         return at[1] if at else None
-    found = (info.quantity for info in describe(options) if info.name == path)
-    quantity = next(found, None)
+    quantities = (info.quantity for info in describe(options) if info.name == path)
+    quantity = next(quantities, None)
     return quantity and quantity.here
 
 
 def name_of(path: str) -> str:
-    """A path in words: `preload torque` for `bench.gear.preload.torque`."""
+    """Name of a path: `preload torque` for `bench.gear.preload.torque`."""
     return " ".join(path.removeprefix(BENCH).split(".")[-2:]).replace("_", " ")
 
 
 def shown_value(value: object, quantity: Quantity | None) -> str:
-    """A swept value (SI) in words: `0.24 Hz`, `18 deg/s²`, `yes`."""
+    """A swept value (SI) as text: `0.24 Hz`, `18 deg/s²`, `yes`."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if not isinstance(value, int | float):
@@ -52,7 +52,7 @@ def words(
     options: type[Options],
     bare: frozenset[str] = frozenset(),
 ) -> Iterator[str]:
-    """Each value of a point: `0.24 Hz` for the paths in `bare`, `preload torque 50 N·m` else."""
+    """Values of a point as text: `0.24 Hz` for paths in `bare`, else `preload torque 50 N·m`."""
     for path, value in point.items():
         text = shown_value(value, quantity_of(path, trial, options))
         yield text if path in bare else f"{name_of(path)} {text}"

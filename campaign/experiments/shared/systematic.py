@@ -1,7 +1,7 @@
 """Systematic parts from a bench's own constants.
 
 A torque is a current times the torque constant, and friction is that torque less J times an
-acceleration. How uncertain those constants are, a bench may say.
+acceleration. A bench may state the uncertainty of those constants.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from campaign.physics.bench import Bench
 TORQUE_CONSTANT = "motor.torque_constant"
 INERTIA = "axis.inertia"
 SOURCES = {TORQUE_CONSTANT: "torque constant", INERTIA: "inertia"}
-"""What a constant is called where its part stands, by its path in the bench."""
+"""Name of a constant as the source of a part, by its path in the bench."""
 
 
 def known_uncertainty(bench: Bench, path: str) -> float | None:
-    """Relative standard uncertainty of the bench's value at a dotted path; None: nobody said."""
+    """Relative standard uncertainty of the bench's value at a dotted path; None: not stated."""
     own = bench.known_uncertainty(path)
     if own is None:
         return None
@@ -36,9 +36,8 @@ def known_uncertainty(bench: Bench, path: str) -> float | None:
 def with_systematic(estimate: Estimate, bench: Bench, path: str, effect: float) -> Estimate:
     """The estimate with the part of one constant of the bench.
 
-    effect: by how much the value moves when the constant grows to twice its size and nothing bends,
-        that is dvalue / d ln(constant), in the value's unit. A torque that follows from a current
-        moves by itself with the torque constant.
+    effect: sensitivity dvalue / d ln(constant), in the value's unit. For a torque that follows from
+        a current and the torque constant it is the torque itself.
     """
     relative = known_uncertainty(bench, path)
     part = None if relative is None else abs(effect) * relative
@@ -46,9 +45,9 @@ def with_systematic(estimate: Estimate, bench: Bench, path: str, effect: float) 
 
 
 def shared_parts(found: Iterable[Estimate]) -> tuple[Systematic, ...]:
-    """The parts of a mean of estimates: no averaging makes them smaller.
+    """Systematic parts of a mean of estimates: averaging does not reduce them.
 
-    Root mean square of each over those that have it; unknown where it is unknown to all.
+    Root mean square of each part over the estimates that state it; unknown if none does.
     """
     sizes: dict[str, list[float]] = {}
     for part in (part for each in found for part in each.systematic):
@@ -65,17 +64,17 @@ SOURCE = "constant of the {} column"
 
 
 def scale_uncertainty(data: TrialData, channel: str) -> float | None:
-    """Relative standard uncertainty of what a column was multiplied by; None: nobody said."""
+    """Relative standard uncertainty of the constant of a column; None: not stated."""
     channels = data.trial.recording.get("channels")
     for each in channels if isinstance(channels, list) else []:
         if isinstance(each, dict) and each.get("name") == channel:
-            found = each.get("relative_uncertainty")
-            return float(found) if isinstance(found, int | float) else None
+            uncertainty = each.get("relative_uncertainty")
+            return float(uncertainty) if isinstance(uncertainty, int | float) else None
     return None
 
 
 def with_scale(estimate: Estimate, data: TrialData, channel: str) -> Estimate:
-    """An estimate that is proportional to a channel, with the part of that channel's constant."""
+    """An estimate proportional to a channel, with the part of that channel's constant."""
     relative = scale_uncertainty(data, channel)
     if relative is None or estimate.origin is Origin.NOT_DETERMINED:
         return estimate

@@ -20,7 +20,7 @@ def preload_of(data: TrialData) -> dict[str, Value]:
 
 
 def compared(errors: Sequence[Finding]) -> Iterator[Finding]:
-    """Findings that follow from pairs of errors which differ in one condition alone.
+    """Findings from pairs of errors that differ in one condition only.
 
     error_reduction: error without compensation over error with it.
     error_decrease: share by which a method's error is below that of the method `against`.
@@ -56,21 +56,21 @@ _BEHIND = {"compensation": (), "average_friction": ("bench.gear.preload.torque",
 
 def _lowest(finding: Finding, errors: Sequence[Finding]) -> bool:
     here = finding.conditions["average_friction"]
-    all_of_them = [e.conditions.get("average_friction") for e in errors]
-    return here == min(v for v in all_of_them if isinstance(v, int | float))
+    preloads = [e.conditions.get("average_friction") for e in errors]
+    return here == min(v for v in preloads if isinstance(v, int | float))
 
 
 Row = Mapping[str, Cell]
 RATIO = "ratio"
 ERROR = "stabilization_error"
 OWN = ("compensation", "error", "peak", "stuck", "repeats", "spread", "next")
-"""What of a row of errors is not the place it is of."""
+"""Entries of a row of errors that are no conditions."""
 PRELOAD_PATH = "bench.gear.preload.torque"
-"""Said already by the average friction."""
+"""Swept path of the preload, which the column `average_friction` shows already."""
 
 
 def beside_rows(rows: Sequence[Row]) -> tuple[Row, ...]:
-    """One for each twin at each place where what it is the twin of was tried, too."""
+    """One row for each identified compensation whose stated one has an error there, too."""
     return tuple(_pairs(rows))
 
 
@@ -97,7 +97,7 @@ def _at(row: Row) -> dict[str, Cell]:
 
 
 def beside_table(rows: Sequence[Row], extra: Sequence[str]) -> Table:
-    """Of `beside_rows`; extra: paths that the test sweeps besides those which have columns."""
+    """Table of `beside_rows`; extra: further swept paths, one column each."""
     columns = [Column("compensation", "Compensation")]
     if any("frequency" in row for row in rows):
         columns.append(Column("frequency", "Frequency", "Hz", "Hz", exact=True))

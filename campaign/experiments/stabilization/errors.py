@@ -19,15 +19,15 @@ COMPENSATION, QUANTITY = "compensation", "stabilization_error"
 FOUND = frozenset({"error", "peak", "stuck", "repeats", "spread", "next"})
 """Entries of a row that are no condition."""
 BARE = frozenset({"frequency", "acceleration", "motion"})
-"""Conditions whose unit, or word, says what they are."""
+"""Conditions that are shown without a name: their unit or word identifies them."""
 SEVERAL = 3
-"""Values of a swept number from which on it has an axis; two stand side by side."""
+"""Fewest values of a swept number for an axis of its own; two values get two panels."""
 MOST_PANELS = 6
-"""of one figure."""
+"""Most panels of a figure."""
 WIDE = 20.0
-"""Ratio of the largest to the smallest error from which on their axis is logarithmic."""
+"""Ratio of the largest to the smallest error above which their axis is logarithmic."""
 DECADE = 10.0
-"""Ratio of the largest to the smallest swept value from which on their axis is."""
+"""Ratio of the largest to the smallest swept value from which their axis is logarithmic."""
 
 BY_METHOD = "error-by-method"
 
@@ -37,7 +37,7 @@ Rows = Sequence[Mapping[str, Cell]]
 def error_figures(
     rows: Rows, paths: Sequence[str], trial: Trial, options: type[Options]
 ) -> Iterator[Figure]:
-    """One figure for each number that is swept, two at most; without such one by method."""
+    """One figure for each swept number, two at most; without a swept number, one by method."""
     known = [row for row in rows if _error(row) is not None]
     swept = [path for path in paths if len(_numbers(known, path)) >= SEVERAL][:2]
     for path in swept:
@@ -65,16 +65,16 @@ def _conditions(row: Mapping[str, Cell]) -> dict[str, Value]:
 
 
 def _places(rows: Rows, paths: Sequence[str], *without: str) -> list[tuple[dict[str, Value], Rows]]:
-    """Rows that differ in nothing but `without`, with what they have in common of the sweep."""
+    """Groups of rows that differ in `without` only, each with its shared swept conditions."""
     places: list[tuple[dict[str, Value], list[Mapping[str, Cell]]]] = []
     for row in rows:
-        told = {p: v for p, v in _conditions(row).items() if p in paths and p not in without}
-        same = next((group for known, group in places if known == told), None)
+        point = {p: v for p, v in _conditions(row).items() if p in paths and p not in without}
+        same = next((group for known, group in places if known == point), None)
         if same is None:
-            places.append((told, [row]))
+            places.append((point, [row]))
         else:
             same.append(row)
-    return [(told, group) for told, group in places]
+    return [(point, group) for point, group in places]
 
 
 def _along(
@@ -85,8 +85,8 @@ def _along(
     if min(values) > 0 and max(values) >= DECADE * min(values):
         axis = replace(axis, scale="log")
     panels = [
-        Panel(axis, _axis(rows), _curves_along(path, group), _title(told, trial, options))
-        for told, group in places[:MOST_PANELS]
+        Panel(axis, _axis(rows), _curves_along(path, group), _title(point, trial, options))
+        for point, group in places[:MOST_PANELS]
     ]
     key = "".join(c if c.isalnum() else "-" for c in path.lower())
     return Figure(
@@ -109,11 +109,11 @@ def _curves_along(path: str, rows: Rows) -> list[Curve]:
     curves = []
     for name, points in methods.items():
         points.sort(key=lambda point: point[0])
-        told = _conditions(points[0][2])
-        told.pop(path, None)
+        conditions = _conditions(points[0][2])
+        conditions.pop(path, None)
         values, errors, _ = zip(*points, strict=True)
         curve = Curve.of(values, errors, method_label(name), name, "line+points")
-        curves.append(replace(curve, quantity=QUANTITY, along=path, conditions=told))
+        curves.append(replace(curve, quantity=QUANTITY, along=path, conditions=conditions))
     return curves
 
 
@@ -126,9 +126,9 @@ def _by_method(rows: Rows, paths: Sequence[str], trial: Trial, options: type[Opt
             axis,
             _axis(rows),
             [_dot(row, methods) for row in group],
-            _title(told, trial, options),
+            _title(point, trial, options),
         )
-        for told, group in places[:MOST_PANELS]
+        for point, group in places[:MOST_PANELS]
     ]
     return Figure(
         key=BY_METHOD,
@@ -143,7 +143,7 @@ def _by_method(rows: Rows, paths: Sequence[str], trial: Trial, options: type[Opt
 
 
 def method_axis(methods: Sequence[str]) -> Axis:
-    """An axis with a place for each method, from 0."""
+    """Axis with one place for each method, from 0."""
     places = tuple((float(k), short_label(name)) for k, name in enumerate(methods))
     return Axis("Compensation", limits=(-0.5, len(methods) - 0.5), places=places)
 
@@ -151,15 +151,15 @@ def method_axis(methods: Sequence[str]) -> Axis:
 def _dot(row: Mapping[str, Cell], methods: Sequence[str]) -> Curve:
     method, error = str(row[COMPENSATION]), _error(row)
     assert error is not None  # noqa: S101 (for the type checker; its rows have one)
-    place, told = float(methods.index(method)), _conditions(row)
-    return Curve.of([place], [error], "", method, quantity=QUANTITY, conditions=told)
+    place, conditions = float(methods.index(method)), _conditions(row)
+    return Curve.of([place], [error], "", method, quantity=QUANTITY, conditions=conditions)
 
 
 def _axis(rows: Rows) -> Axis:
-    """One scale for all panels, from zero where no error is far below another."""
-    found = [error.value for row in rows if (error := _error(row)) is not None]
-    positive = [value for value in found if value > 0]
-    wide = len(positive) == len(found) and max(positive) > WIDE * min(positive)
+    """Error axis of all panels: from zero, or logarithmic above a ratio of `WIDE`."""
+    values = [error.value for row in rows if (error := _error(row)) is not None]
+    positive = [value for value in values if value > 0]
+    wide = len(positive) == len(values) and max(positive) > WIDE * min(positive)
     label = "Stabilization error (1σ)"
     if wide:
         return Axis(label, "rad", "mrad", scale="log")
@@ -172,7 +172,7 @@ def _title(told: Mapping[str, Value], trial: Trial, options: type[Options]) -> s
 
 
 def _where(rows: Rows, along: str, trial: Trial, options: type[Options]) -> str:
-    """` at 36 deg/s²`: what of the motion is the same in all rows; "" for nothing."""
+    """` at 36 deg/s²`: frequency and acceleration that all rows share; "" for none."""
     same = {
         name: rows[0].get(name)
         for name in ("frequency", "acceleration")

@@ -68,7 +68,7 @@ from campaign.signals import Sine
 from campaign.trial import OfferedRecording, Trial, TrialRequest
 
 SAMPLES_PER_CYCLE = 10
-"""of the base motion, at least: the standard deviation needs the shape of the error."""
+"""Fewest samples in a cycle: the standard deviation needs the shape of the error."""
 LARGEST = "largest_error"
 OF_A_RECORD = Cause("largest of its record", "the largest value of a record grows with its length")
 SPREAD = Cause(
@@ -76,7 +76,7 @@ SPREAD = Cause(
 )
 STUCK = "time_stuck"
 SHOW_STUCK = (BASE_RATE, RELATIVE_ANGLE, GYRO_RATE)
-"""Channels of the rate of the hull and of what resolves the rate relative to it."""
+"""Channels of the time stuck: rate of the hull, and those that resolve the relative rate."""
 
 
 class StabilizationOptions(SineMotionOptions):
@@ -115,7 +115,7 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
 def _found(
     options: StabilizationOptions, bench: Bench, offered: OfferedRecording
 ) -> Iterator[TrialRequest]:
-    """The swinging hull of a recording that nobody planned."""
+    """Trial of the sinusoidal hull motion in an unplanned recording."""
     request = hull_sine(offered, MEASURED, options.settle_cycles)
     compensated = request.task.model_copy(update={"compensation": options.compensation})
     yield replace(
@@ -124,7 +124,7 @@ def _found(
 
 
 def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion) -> TrialRequest:
-    """The trial of a motion that is no sine: all of it is measured once it has settled."""
+    """Trial of a motion that is no sine: the measurement starts after the settling time."""
     given = [name for name in OF_A_SINE if name in options.model_fields_set]
     if given:
         raise ValueError(
@@ -139,7 +139,7 @@ def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion)
 
 
 def _can_use(options: StabilizationOptions) -> tuple[str, ...]:
-    """Channels of its figures; those of what a compensation adds where there is one."""
+    """Channels of the figures; with a compensation also its torque and the friction torque."""
     rates = (BASE_RATE, RELATIVE_RATE, RELATIVE_ANGLE, GYRO_RATE)
     if options.compensation == "none":
         return rates
@@ -158,7 +158,7 @@ def _measure(data: TrialData) -> list[Estimate]:
 
 
 def _time_stuck(recording: Recording, trial: Trial) -> Iterator[Estimate]:
-    """Share of the time that the load moves with the hull, where its channels were recorded."""
+    """Share of time in which the load moves with the hull; nothing without the channels."""
     if missing(SHOW_STUCK, recording.channels):
         return
     signal, rate = trial.task.base_acceleration, rate_of(recording)
@@ -173,13 +173,13 @@ def _time_stuck(recording: Recording, trial: Trial) -> Iterator[Estimate]:
 
 
 def _told(data: TrialData, columns: Sequence[str]) -> dict[str, Value]:
-    """Conditions of the trial; an irregular motion has its kind, not a sine's numbers."""
+    """Conditions of the trial: of an irregular motion its kind, not frequency and acceleration."""
     motion = data.trial.options.get("motion")
     kind = motion.get("kind", "sine") if isinstance(motion, Mapping) else "sine"
     if kind == "sine":
         return conditions(data, *columns)
-    told = conditions(data, "compensation")
-    return {**told, "motion": str(kind)}
+    stated = conditions(data, "compensation")
+    return {**stated, "motion": str(kind)}
 
 
 def _analyse(data: TestData) -> Result:
@@ -189,11 +189,11 @@ def _analyse(data: TestData) -> Result:
     findings: list[Finding] = []
     rows: list[dict[str, Cell]] = []
     for group in groups.values():
-        told = _told(group[0], columns) | preload_of(group[0])
+        point = _told(group[0], columns) | preload_of(group[0])
         row = _row(group)
-        told_of = (row["error"], row.get("next"))
-        findings += [Finding.of(cell, told) for cell in told_of if isinstance(cell, Estimate)]
-        rows.append({**told, **row})
+        cells = (row["error"], row.get("next"))
+        findings += [Finding.of(cell, point) for cell in cells if isinstance(cell, Estimate)]
+        rows.append({**point, **row})
     firsts = [group[0] for group in groups.values()]
     errors = [finding for finding in findings if finding.quantity == "stabilization_error"]
     findings += compared(errors)
@@ -202,7 +202,7 @@ def _analyse(data: TestData) -> Result:
     tables = [_table(rows, extra, seen_through(firsts[0].trial) if firsts else "")]
     beside = beside_rows(rows)
     if beside:
-        tables.insert(0, beside_table(beside, extra))  # what such a test is about
+        tables.insert(0, beside_table(beside, extra))  # first, as the purpose of such a test
     return Result(
         tuple(tables),
         tuple(figures),
@@ -212,13 +212,13 @@ def _analyse(data: TestData) -> Result:
 
 
 def _telling(keys: Sequence[str]) -> str:
-    """An error; by method last, as a dot for each says no more than the table does."""
+    """Key of an error figure; by method last, because the table has the same numbers."""
     errors = [key for key in keys if "error" in key]
     return min(errors, key=lambda key: key == BY_METHOD, default="")
 
 
 def _row(group: Sequence[TrialData]) -> dict[str, Cell]:
-    """What the repetitions of one place say, one of them or more."""
+    """Cells of one condition, from one or more repetitions."""
     errors = of_each(group, _measure, "stabilization_error")
     peaks = of_each(group, _measure, LARGEST)
     stuck = over_recordings(of_each(group, _measure, STUCK))

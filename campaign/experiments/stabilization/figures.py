@@ -46,13 +46,13 @@ NUMBERS: Mapping[tuple[float, float], Mapping[str, tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Condition:
-    """One condition of the sweep: a trial of each method, and where that is.
+    """One condition of the sweep, with a trial of each method.
 
     Attributes:
         trials: by method.
-        errors: of all repetitions, by method; those that have one.
-        words: the condition, for a caption.
-        numbers: the thesis' figures of this condition, by what they show.
+        errors: over all repetitions, by method; only finite ones.
+        words: caption text on the condition.
+        numbers: figure numbers of the thesis, by content: `rate`, `error`, `torque`.
     """
 
     trials: Mapping[str, TrialData]
@@ -62,9 +62,9 @@ class Condition:
 
     @property
     def largest(self) -> float:
-        """Error without compensation, or else the largest of all; negative without any."""
-        found = {name: error.value for name, error in self.errors.items()}
-        return found.get("none", max(found.values(), default=-1.0))
+        """Error without compensation, else the largest error; negative without errors."""
+        values = {name: error.value for name, error in self.errors.items()}
+        return values.get("none", max(values.values(), default=-1.0))
 
     @property
     def shown(self) -> tuple[int, ...]:
@@ -80,8 +80,8 @@ def stabilization_figures(
 ) -> Iterator[Figure]:
     """The errors of the methods, and time histories of one trial per method.
 
-    `firsts` are the first trials of the sweep's places, `rows` those of the table, in that order;
-    `options` are those of a test, which know their units.
+    firsts: first trial of each condition and method. rows: of the table, in the same order.
+    options: class of the test's options, which declares units.
     """
     if not firsts:
         return
@@ -101,7 +101,7 @@ def _places(
     paths: Sequence[str],
     options: type[Options],
 ) -> list[Condition]:
-    """The conditions of the sweep, with every method that was tried there."""
+    """Conditions of the sweep, each with all of its methods."""
     trials: dict[str, dict[str, TrialData]] = {}
     errors: dict[str, dict[str, Estimate]] = {}
     for item, row in zip(firsts, rows, strict=True):
@@ -123,10 +123,10 @@ def _places(
 
 
 def _condition_words(item: TrialData, options: type[Options], places: int) -> str:
-    """`Shown at 2 Hz, 36 deg/s², one of 7 conditions.`, with all that the sweep says of it."""
+    """`Shown at 2 Hz, 36 deg/s², one of 7 conditions.`: caption text with all swept values."""
     sine = isinstance(item.trial.task.base_acceleration, Sine)
-    told = conditions(item, *(("frequency", "acceleration") if sine else ()))
-    point = {path: value for path, value in told.items() if path != COMPENSATION}
+    stated = conditions(item, *(("frequency", "acceleration") if sine else ()))
+    point = {path: value for path, value in stated.items() if path != COMPENSATION}
     text = ", ".join(words(point, item.trial, options, BARE))
     several = f", one of {places} conditions" if places > 1 else ""
     return f" Shown at {text}{several}." if text else ""
@@ -136,15 +136,15 @@ def _numbers(item: TrialData) -> Mapping[str, tuple[str, ...]]:
     motion = item.trial.task.base_acceleration
     if not isinstance(motion, Sine):
         return {}
-    here = motion.frequency, float(np.rad2deg(motion.amplitude))
-    for there, numbers in NUMBERS.items():
-        if np.allclose(here, there):
+    own = motion.frequency, float(np.rad2deg(motion.amplitude))
+    for condition, numbers in NUMBERS.items():
+        if np.allclose(own, condition):
             return numbers
     return {}
 
 
 def _telling_place(places: Sequence[Condition]) -> Condition:
-    """Of the conditions with most methods the one that the thesis draws, else of largest error."""
+    """Condition with most methods: one that the thesis draws, else that of the largest error."""
     most = max(len(place.trials) for place in places)
     whole = [place for place in places if len(place.trials) == most]
     drawn = [place for place in whole if place.numbers]
@@ -162,7 +162,7 @@ def _rate_figure(place: Condition) -> Iterator[Figure]:
     cuts = {name: _cut(item) for name, item in place.trials.items()}
     if not all(can_be_shown(cut) for cut in cuts.values()):
         return
-    found = reversal(cuts)
+    result = reversal(cuts)
     yield Figure(
         key="relative-rate",
         title="Rate of the load relative to the hull",
@@ -170,10 +170,10 @@ def _rate_figure(place: Condition) -> Iterator[Figure]:
         "friction moves the load with the hull; overcompensation moves it ahead of the hull. "
         "Titles: largest deviation from the dotted line"
         f"{'; last panel: deviation of each method' if len(cuts) > 1 else ''}. "
-        f"{found.words}{place.words}",
+        f"{result.words}{place.words}",
         alt="Relative rate over time: the whole motion, one reversal for each compensation method "
         "beside the line of a load held still, and the difference.",
-        panels=found.panels,
+        panels=result.panels,
         thesis=place.numbers.get("rate", ()),
         across=2,
         trials=place.shown,
@@ -190,7 +190,7 @@ def _error_figure(place: Condition) -> Figure:
         curve = Curve(cut.time - window.start, error, method_label(name), name)
         title = method_label(name)
         if len(position) and np.isfinite(position).all():
-            own = largest_of(position)  # of all that is measured, as the table has it
+            own = largest_of(position)  # over the whole measurement, as in the table
             title += f": {amount(own, 'rad', 'mrad')}"
             largest = max(largest, own)
         marks = [
@@ -202,7 +202,7 @@ def _error_figure(place: Condition) -> Figure:
     limits = (-1.05 * largest, 1.05 * largest)
     spans = [np.ptp(panel.curves[0].y) if panel.curves[0].y.size else np.nan for panel in panels]
     small = [span < SMALL * np.ptp(limits) for span in spans]
-    if largest > 0.0:  # one scale, which shows what each method gains
+    if largest > 0.0:  # one scale, to compare the methods
         panels = [
             panel if alone else replace(panel, y=replace(ERROR, limits=limits))
             for panel, alone in zip(panels, small, strict=True)
@@ -225,10 +225,10 @@ def _error_figure(place: Condition) -> Figure:
 
 
 def _reversals(item: TrialData, window: Window) -> Array:
-    """Times (s) within what is shown, the window, at which the hull is to turn around, shape (n,).
+    """Times (s) from the start of the window at which the hull is to reverse, shape (n,).
 
-    It swings about a rate of zero, which its sinusoidal acceleration passes at its extremes; of
-    another motion only the recording knows. Nothing where there are too many to tell apart.
+    The rate is zero at the extremes of a sinusoidal acceleration. Empty for another motion, and
+    for more than `MOST_REVERSALS`.
     """
     motion = item.trial.task.base_acceleration
     if not isinstance(motion, Sine):
@@ -236,27 +236,27 @@ def _reversals(item: TrialData, window: Window) -> Array:
     halves = 2.0 * motion.frequency
     first = 0.5 - motion.phase / np.pi  # half cycles until the first extreme
     numbers = np.arange(np.ceil(halves * window.start - first), halves * window.stop - first)
-    found = (numbers + first) / halves - window.start
-    return found if len(found) <= MOST_REVERSALS else np.empty(0)
+    times = (numbers + first) / halves - window.start
+    return times if len(times) <= MOST_REVERSALS else np.empty(0)
 
 
 SMALL = 0.05
-"""Share of the common scale below which a curve has its own: nothing of it would be seen."""
+"""Share of the common scale below which a curve has its own scale, to stay visible."""
 MOST_REVERSALS = 8
-"""that are marked."""
+"""Most reversals that are marked."""
 CHATTER = 3.0
-"""times as far as its own mean a torque runs up and down that chatters."""
+"""Ratio of the total variation of a torque to that of its mean, above which it chatters."""
 SMOOTHED = 0.02
-"""of the time shown: the window of that mean ..."""
+"""Window of that mean, as a share of the time shown ..."""
 SHORTEST_WINDOW = 5
-"""... and its samples at least."""
+"""... and its fewest samples."""
 
 
 def _without_chatter(time: Array, torque: Array, name: str) -> tuple[list[Curve], float]:
-    """A torque as its mean over a window before what it ranges over within it, and the window (s).
+    """Curves of a torque: its moving mean before a band of its range; and the window (s).
 
-    A model that is fed with counts of an encoder jumps with every one of them, and as a line that
-    is a filled shape. A torque that does not chatter is itself; its window is 0.
+    The torque of a model with counts of an encoder as input jumps at every count, and its line
+    fills an area. A torque without chatter is one curve, with the window 0.
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -266,8 +266,8 @@ def _without_chatter(time: Array, torque: Array, name: str) -> tuple[list[Curve]
         return [whole], 0.0
     average = mean(torque, size)
     known = np.isfinite(average)
-    way = np.abs(np.diff(torque[known])).sum()
-    if way <= CHATTER * np.abs(np.diff(average[known])).sum():
+    variation = np.abs(np.diff(torque[known])).sum()
+    if variation <= CHATTER * np.abs(np.diff(average[known])).sum():
         return [whole], 0.0
     high, low = (
         np.where(known, ends(torque, size), np.nan) for ends in (maximum_filter1d, minimum_filter1d)
@@ -277,7 +277,7 @@ def _without_chatter(time: Array, torque: Array, name: str) -> tuple[list[Curve]
 
 
 def _chatter_words(windows: Sequence[float]) -> str:
-    """How lines were come by whose torque jumps with every count of a sensor."""
+    """Caption sentence on averaged torques; empty without any."""
     if not windows:
         return ""
     return (
@@ -287,10 +287,7 @@ def _chatter_words(windows: Sequence[float]) -> str:
 
 
 def _torque_figure(place: Condition) -> Iterator[Figure]:
-    """A panel for each method: what it adds, and the friction that acted in the same trial.
-
-    All have one scale.
-    """
+    """Compensation torque and friction of the same trial, one panel for each method, one scale."""
     panels: list[Panel] = []
     left: list[Curve] = []
     windows: list[float] = []
@@ -313,7 +310,7 @@ def _torque_figure(place: Condition) -> Iterator[Figure]:
     torque = replace(TORQUE, limits=(-1.05 * largest, 1.05 * largest)) if largest else TORQUE
     panels = [replace(panel, y=torque) for panel in panels]
     beside = ", beside the friction that acted (known only to a simulation)" if left else ""
-    if len(left) > 1:  # how far off each method is, beside the others
+    if len(left) > 1:  # the residuals of all methods in one panel
         panels.append(Panel(TIME, LEFT, left, "All: friction less compensation"))
         beside += "; last panel: friction less compensation, on a scale of its own"
     yield Figure(

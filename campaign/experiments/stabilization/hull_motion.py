@@ -42,7 +42,7 @@ class SeriesMotion(SeriesFile):
             raise ValueError(f"the series lasts {time[-1]:.4g} s, no longer than settle")
 
     def signal(self) -> tuple[Polyline, float, float]:
-        """Acceleration of the hull (rad/s^2), and start and stop of what is measured (s)."""
+        """Acceleration of the hull (rad/s^2), start and stop of the measurement (s)."""
         time, value = self.samples()
         signal = motion_signal(time, value, kind_of(self.value), self.lead_in)
         return signal, self.lead_in + self.settle, self.lead_in + float(time[-1])
@@ -81,7 +81,7 @@ class ShipMotion(Options):
         return self
 
     def signal(self) -> tuple[MultiSine, float, float]:
-        """Acceleration of the hull (rad/s^2), and start and stop of what is measured (s)."""
+        """Acceleration of the hull (rad/s^2), start and stop of the measurement (s)."""
         ship = ShipRoll(
             self.significant_height,
             self.peak_period,

@@ -23,31 +23,31 @@ AWAY = Axis("Rate off the dotted line", "rad/s", "deg/s")
 BEFORE = 0.0133
 """Time before the reversal in a zoom, as a share of the time shown ..."""
 AT_LEAST = 0.04
-"""... and at least (s): how long friction holds a load does not fall with the period ..."""
+"""... and at least (s), because the sticking time does not fall with the period ..."""
 MOST = 0.08
-"""... but never so much of the time shown that the next reversal is in the zoom, too: of a sine
-that is shown for 1.5 cycles it is 0.33 away."""
+"""... and at most, which keeps the next reversal out of the zoom: for a sine shown for 1.5 cycles
+it is 0.33 of the time shown away."""
 WIDER = (1.0, 1.7, 3.0, 5.0)
-"""times as wide a zoom, one after the other, until every load is seen to break loose."""
+"""Factors on the width of the zoom, tried in order until every load is seen to break loose."""
 AFTER = 2.0
 """Time after the reversal, as a share of that before it."""
 SEEN = 0.05
-"""Rate that must be seen, as a share of the zoom's half height."""
+"""Rate that must be resolved, as a share of the zoom's half height."""
 FILTERED = 0.15
 """Longest filter, as a share of the zoom's time ..."""
 WHOLE = (0.01, 0.02)
-"""... and of the whole motion: rate that must be seen, as a share of the hull's largest, and
+"""... and for the whole motion: rate that must be resolved, as a share of the hull's largest, and
 longest filter, as a share of the time shown."""
 HELD = "held still in space"
 SHORTEST = 10
-"""Samples of a recording that has anything to show."""
+"""Fewest samples of a recording that is shown."""
 SLOW = 0.15
-"""Share of the zoom's half height below which the load counts as carried along."""
+"""Share of the zoom's half height below which the load counts as moving with the hull."""
 
 
 @dataclass(frozen=True)
 class Zoom:
-    """What is shown of a reversal: beginning, middle and end (s), and half the height (rad/s)."""
+    """Section around a reversal: start, middle and stop (s), half the height (rad/s)."""
 
     start: float
     middle: float
@@ -60,7 +60,7 @@ class Zoom:
 
 @dataclass(frozen=True)
 class Slow:
-    """Beginning and end (s) of a time; `cut` where it goes on beyond what is shown or known."""
+    """Interval (s) of a slow load; `cut` if it extends beyond the shown or known samples."""
 
     start: float
     stop: float
@@ -77,8 +77,8 @@ class MethodRate:
 
     Attributes:
         time: s, shape (n,); also of `held`, the rate of a load held still in space (rad/s).
-        rate: by the sensor that shows it.
-        slow: the time in which it is slow; None where the sensor is too coarse to see that.
+        rate: from the sensor that resolves it.
+        slow: interval of a slow load; None without one, and if the sensor is too coarse.
     """
 
     time: Array
@@ -88,36 +88,32 @@ class MethodRate:
 
     @property
     def farthest(self) -> float:
-        """From the rate of a load held still (rad/s); NaN where nothing is known."""
+        """Largest deviation from a load held still (rad/s); NaN without values."""
         away = np.abs(self.rate.values - self.held)
         return float(np.nanmax(away)) if np.isfinite(away).any() else math.nan
 
 
 @dataclass(frozen=True)
 class Reversal:
-    """Panels of the relative rate, and what is to be said of their picture.
-
-    Attributes:
-        words: sentences for the caption.
-    """
+    """Panels of the relative rate, and sentences for their caption (`words`)."""
 
     panels: tuple[Panel, ...]
     words: str
 
 
 def can_be_shown(cut: Recording) -> bool:
-    """Whether it has the rates that a figure of them needs, and of the hull a motion."""
+    """Whether a recording has enough samples, both rates, and a moving hull."""
     if missing((BASE_RATE, RELATIVE_RATE), cut.channels) or len(cut.time) < SHORTEST:
         return False
     return bool(np.nanmax(np.abs(cut[BASE_RATE]), initial=0.0) > 0)
 
 
 def reversal(cuts: Mapping[str, Recording]) -> Reversal:
-    """The whole motion with the first method, then a zoom on one reversal for each method.
+    """Panels of the whole motion with the first method, then one reversal for each method.
 
-    Last, where there are several, what each is off a load held still, beside the others.
+    The last panel compares the deviations of several methods from a load held still.
 
-    cuts: by method, on a time axis of their own; each `can_be_shown`.
+    cuts: by method, each on its own time axis; each `can_be_shown`.
     """
     name, first = next(iter(cuts.items()))
     largest, span = float(np.nanmax(np.abs(first[BASE_RATE]))), float(np.ptp(first.time))
@@ -137,7 +133,7 @@ def reversal(cuts: Mapping[str, Recording]) -> Reversal:
 
 
 def _zoomed(cuts: Mapping[str, Recording], first: Recording) -> tuple[Zoom, dict[str, MethodRate]]:
-    """The smallest zoom in which every load is seen to come out of its slow time, if any is."""
+    """Smallest zoom that cuts no slow interval, else the widest one; rates by method in it."""
     for wider in WIDER:
         zoom = _zoom(first, wider)
         shown = {method: _near(cut, zoom) for method, cut in cuts.items()}
@@ -147,7 +143,7 @@ def _zoomed(cuts: Mapping[str, Recording], first: Recording) -> tuple[Zoom, dict
 
 
 def _zoom(recording: Recording, wider: float) -> Zoom:
-    """Around the middle one of the hull's reversals."""
+    """Zoom around the middle one of the hull's reversals, by a factor `wider`."""
     time, rate = recording.time, recording[BASE_RATE]
     changes = np.flatnonzero(np.diff(np.sign(rate)) != 0)
     span = float(np.ptp(time))
@@ -159,7 +155,7 @@ def _zoom(recording: Recording, wider: float) -> Zoom:
 
 
 def _seen(cut: Recording, finest: float, longest: float) -> RelativeRate:
-    """The relative rate by what shows `finest` (rad/s), filtered over at most `longest` (s)."""
+    """Relative rate that resolves `finest` (rad/s), filtered over at most `longest` (s)."""
     angle, gyro = (
         cut[name] if name in cut.channels else None for name in (RELATIVE_ANGLE, GYRO_RATE)
     )
@@ -177,7 +173,7 @@ def _near(cut: Recording, zoom: Zoom) -> MethodRate:
 
 
 def _slow(time: Array, rate: Array, zoom: Zoom) -> Slow | None:
-    """The slow time that is nearest to the reversal; None where it is never slow."""
+    """Slow interval nearest to the reversal; None if the load is never slow."""
     slow = np.abs(rate) < SLOW * zoom.height
     places = np.flatnonzero(slow)
     if not len(places):
@@ -219,7 +215,7 @@ def _zoom_panel(name: str, shown: MethodRate, zoom: Zoom) -> Panel:
 
 
 def _away_panel(shown: Mapping[str, MethodRate], zoom: Zoom) -> Iterator[Panel]:
-    """How far off a load held still each method's is: what differs most, so in one panel."""
+    """Deviations of all methods from a load held still in one panel; nothing for one method."""
     curves = [
         Curve(each.time, each.rate.values - each.held, method_label(name), name)
         for name, each in shown.items()
@@ -235,7 +231,7 @@ def _time(seconds: float) -> str:
 
 
 def _filter_words(whole: RelativeRate, shown: Sequence[MethodRate]) -> Iterator[str]:
-    """How the rates were come by; nothing for those that are as they were recorded."""
+    """Caption sentences on the filters of the rates; nothing on unfiltered rates."""
     zooms = list(dict.fromkeys(_how(each.rate) for each in shown))
     if zooms == [_how(whole)]:
         yield f"All rates are {zooms[0]}." if zooms[0] else ""
@@ -262,7 +258,7 @@ def _how(rate: RelativeRate) -> str:
 
 
 def _slow_words(shown: Sequence[MethodRate], zoom: Zoom) -> str:
-    """What is shaded, and how long a load held still would take."""
+    """Caption sentence on the shaded interval, and on that of a load held still."""
     if all(each.slow is None for each in shown):
         return ""
     held = _slow(shown[0].time, shown[0].held, zoom)
@@ -272,7 +268,7 @@ def _slow_words(shown: Sequence[MethodRate], zoom: Zoom) -> str:
 
 
 def _blind_words(first: Recording, shown: Sequence[MethodRate], zoom: Zoom) -> str:
-    """Until when an encoder does not tell a load that sticks from one that is held still."""
+    """Caption sentence on the time in which the encoder cannot show whether the load sticks."""
     count = max((each.rate.blind for each in shown), default=0.0)
     if not count:
         return ""

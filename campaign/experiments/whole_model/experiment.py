@@ -1,7 +1,8 @@
 """Friction models along any motion, fitted through the engine and compared.
 
-The friction models of this program meet the measured rate, with their own state; inertia, delay and
-linear terms are fitted with them. What has no information goes to no bench file.
+Each friction model runs along the measured rate with its own state; inertia, delay and linear terms
+are fitted with it. Numbers of the friction model that the motion does not determine fill in a bench
+file as settings; other undetermined numbers are in no bench file.
 """
 
 from __future__ import annotations
@@ -45,9 +46,9 @@ PARTS = Cause(
     "a fit of all takes too long",
 )
 STILL = 0.25
-"""of the rate below which a plain regression takes an axis for standing: curves begin there."""
+"""Share of the standstill rate of a plain regression; friction curves begin below that rate."""
 LINEAR = ("spring", "gravity", "cogging")
-"""Beginnings of terms of a plain regression that no friction model stands in for."""
+"""Prefixes of regression terms that no friction model replaces."""
 ADVICE = {
     "inertia": "move with more acceleration at the same speeds",
     "spring": "move over more of the travel",
@@ -76,7 +77,7 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
     filtering, whole, unseen = read(data, options.low_pass, options.decimation, options.skip)
     moves = with_slowest(filtering, whole, None)
     pieces = telling_parts(whole, moves)
-    if pieces is not whole:  # parts lie behind what is skipped
+    if pieces is not whole:  # parts begin after the skipped samples
         unseen = tuple(each.part(slice(moves.skip, None)) for each in unseen)
         moves = replace(moves, skip=0)
     filtering = replace(moves, slowest=STILL * moves.slowest)
@@ -107,7 +108,7 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
 
 
 def _left_out(whole: Sequence[MotionPiece], parts: Sequence[MotionPiece]) -> tuple[Reason, ...]:
-    """Of long recordings."""
+    """Reason for a fit to parts of long recordings; empty for a fit to all."""
     if parts is whole:
         return ()
     used, recorded = (
@@ -143,9 +144,9 @@ def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:
 
 
 def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[object, str, str]]:
-    """The model's name, and numbers that the motion leaves open: a bench needs them, too."""
+    """Name of the model, and numbers that the motion leaves open, both required by a bench."""
     stated = {each.bench for each in parameters}
-    told: dict[str, tuple[object, str, str]] = {
+    settings: dict[str, tuple[object, str, str]] = {
         f"{FRICTION}.model": (best.model.model, "", "fitted")
     }
     model, values = best.model, best.values
@@ -155,8 +156,8 @@ def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[obj
         if f"{FRICTION}.{key}" not in stated:
             estimate = best.fit.estimates.get(each.name)
             why = LEFT_OPEN if estimate is None else estimate.reason
-            told[f"{FRICTION}.{key}"] = (value, each.unit, str(why))
-    return told
+            settings[f"{FRICTION}.{key}"] = (value, each.unit, str(why))
+    return settings
 
 
 def _notes(best: Fit) -> Iterator[str]:
@@ -170,13 +171,13 @@ def _notes(best: Fit) -> Iterator[str]:
         ratio = best.fit.estimates[number.name]
         low, high = ratio.combined
         if ratio.origin is Origin.MEASURED and high is not None and high < 1.0:
-            told = number.below_one
+            note = number.below_one
         elif ratio.origin is not Origin.MEASURED or low is None or low <= 1.0:
-            told = number.about_one
+            note = number.about_one
         else:
-            told = ""
-        if told:
-            yield told
+            note = ""
+        if note:
+            yield note
     yield (
         "Each model met the rate that was measured, in steps of the recording; a loop that was "
         "closed on that rate is in the data, and not in the model."

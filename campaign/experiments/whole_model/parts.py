@@ -16,20 +16,20 @@ from campaign.experiments.any_motion.motions import MotionPiece
 from campaign.experiments.whole_model.residuals import steps_between
 
 MOST_STEPS = 60_000
-"""Simulated steps of all parts together: the fits simulate them some thousand times."""
+"""Most simulated steps of all parts together: fits simulate them some thousand times."""
 PART = 5.0
-"""s; long against what residuals know of each other and against the ends that are left out."""
+"""Length of a part (s): long against the correlation of residuals, and the omitted ends."""
 SLOW = (0.01, 0.1)
-"""of the fastest rate, over which friction may change as sliding sets in."""
+"""Shares of the fastest rate over which friction may change at the onset of sliding."""
 
 
 def telling_parts(
     pieces: Sequence[MotionPiece], filtering: FilterSettings
 ) -> Sequence[MotionPiece]:
-    """All pieces where a fit can simulate them, or else their parts that tell most, in order.
+    """All pieces if a fit can simulate them, else their most informative parts, in order.
 
-    One part after the other that raises the determinant of the normal equations most (Wynn, Ann.
-    Math. Stat. 41, 1970). The motion alone decides, and no residual: nothing is biased by it.
+    Each step adds the part that raises the determinant of the normal equations most (Wynn, Ann.
+    Math. Stat. 41, 1970). Only the motion decides, not the residuals, which prevents a bias.
     """
     every = steps_between(filtering)
     if sum(len(each.motion.time) for each in pieces) <= MOST_STEPS * every:
@@ -62,7 +62,7 @@ def _cut(piece: MotionPiece, skip: int) -> list[MotionPiece]:
 
 
 def _terms(fastest: float) -> list[Term]:
-    """What a friction model has, linearised: where it slides slowly counts on its own."""
+    """Linearised terms of a friction model, with terms of their own for slow sliding."""
     names = ("spring", *DIRECTIONAL)
     return [TERMS[name] for name in names] + [
         _slow(share * fastest, sign) for share in SLOW for sign in (1.0, -1.0)

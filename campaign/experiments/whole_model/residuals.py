@@ -21,9 +21,9 @@ from campaign.physics.friction.unknowns import EXPONENT, DerivedOption, Friction
 from campaign.physics.friction_response import Along
 
 USUAL = ("stribeck", "lugre")
-"""What is tried unless something else is said; the first one with directions alike, too."""
+"""Models that are fitted by default; the first one with directions alike, too."""
 EXPONENT_FREE = ", exponent free"
-"""End of the name of a model whose exponent is fitted."""
+"""Suffix of the name of a model with a fitted exponent."""
 WAYS = (("directions alike", False), ("by direction", True))
 
 
@@ -33,8 +33,8 @@ class Model:
 
     Attributes:
         name: `lugre by direction`.
-        model: of the program, by its name.
-        numbers: those that are fitted.
+        model: name of the friction model.
+        numbers: fitted ones.
         derived: options that follow from several of them.
     """
 
@@ -45,20 +45,20 @@ class Model:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """In their order."""
+        """Unknowns of `numbers`, in that order."""
         return tuple(
             Unknown(each.name, each.low, each.high, each.start, each.logarithmic)
             for each in self.numbers
         )
 
     def with_exponent_free(self, values: Mapping[str, float]) -> Model | None:
-        """The same with the exponent of its Stribeck curve as a further unknown.
+        """The model with the exponent of its Stribeck curve as a further unknown.
 
-        None where it has none, or where that is free. values: of a fit, where a search begins.
+        None without an exponent, or if it is free already. values: of a fit, to start from.
         """
-        there = "stribeck_exponent" in friction_models()[self.model].options.model_fields
+        has_exponent = "stribeck_exponent" in friction_models()[self.model].options.model_fields
         names = {each.name for each in self.numbers}
-        if not there or EXPONENT.name in names or "stribeck_velocity" not in names:
+        if not has_exponent or EXPONENT.name in names or "stribeck_velocity" not in names:
             return None
         numbers = (*(replace(each, start=values[each.name]) for each in self.numbers), EXPONENT)
         return replace(self, name=f"{self.name}{EXPONENT_FREE}", numbers=numbers)
@@ -78,40 +78,40 @@ class Model:
 
 
 def models(sizes: Sizes, names: Sequence[str] = USUAL) -> Sequence[Model]:
-    """The models that are tried, in their order; the first with directions alike, too.
+    """Models to fit, in order; the first one with directions alike, too.
 
-    Raises ValueError for a model that is not there, or does not say what is fitted of it.
+    Raises ValueError for an unknown model, and for one that declares no unknowns.
     """
     found: list[Model] = []
     for name in names:
         unknowns = model_called(name).unknowns
         if unknowns is None:
             known = friction_models()
-            there = ", ".join(each for each in known if known[each].unknowns is not None)
-            raise ValueError(f"{name} does not say what is fitted of it; there are {there}")
-        for way, by_direction in WAYS[1:] if found else WAYS:
+            fitted = ", ".join(each for each in known if known[each].unknowns is not None)
+            raise ValueError(f"{name} does not say what is fitted of it; there are {fitted}")
+        for suffix, by_direction in WAYS[1:] if found else WAYS:
             stated = unknowns(sizes, by_direction)
             numbers = tuple(each for each in stated if isinstance(each, FrictionUnknown))
             derived = tuple(each for each in stated if isinstance(each, DerivedOption))
-            found.append(Model(f"{name}, {way}", name, numbers, derived))
+            found.append(Model(f"{name}, {suffix}", name, numbers, derived))
     return found
 
 
 STEPS = 10
-"""Simulated steps of a row at least: rates of a motion are low-passed, and rows all the more."""
+"""Fewest simulated steps of a row: rates of a motion are low-passed, and rows even more."""
 KEPT = 16
-"""Simulations that are kept: more than a model has numbers. Derivatives by inertia, delay and
-linear terms ask for the friction of the point itself."""
+"""Simulations in the cache: more than a model has numbers. Derivatives by inertia, delay and linear
+terms use the friction of the point itself."""
 
 
 def steps_between(filtering: FilterSettings) -> int:
-    """Samples from one simulated step to the next: rows remain where they are."""
+    """Samples from one simulated step to the next, a divisor of the distance of rows."""
     most = max(1, filtering.decimation // STEPS)
     return next(n for n in range(most, 0, -1) if filtering.decimation % n == 0)
 
 
 class Residuals:
-    """Of a model along motions; all but friction is linear in its values, and filtered once."""
+    """Residual force of a model along motions; only friction is nonlinear and filtered again."""
 
     def __init__(
         self,
@@ -137,20 +137,20 @@ class Residuals:
         self._friction = lru_cache(KEPT)(self._simulated)
 
     def __call__(self, values: Values) -> list[Array]:
-        """Of rows in which the axis moves, one array of shape (n,) for each motion."""
+        """Residuals, shape (n,) for each motion; zero in rows in which the axis does not move."""
         return [
-            (force - said) * moves
-            for force, said, moves in zip(
+            (force - modelled) * moves
+            for force, modelled, moves in zip(
                 self.forces(values), self.modelled(values), self._moves, strict=True
             )
         ]
 
     def forces(self, values: Values) -> list[Array]:
-        """Recorded ones, as late as they are."""
+        """Rows of the recorded forces at the delay."""
         return [each.at(values[self._delay]) for each in self._forces]
 
     def modelled(self, values: Values) -> list[Array]:
-        """What the model asks for."""
+        """Forces of the model."""
         linear = np.array([values[place] for place in self._places])
         friction = self._friction(tuple(values[place] for place in self._own))
         return [
@@ -167,7 +167,7 @@ class Residuals:
 
 
 def _thinned(motion: Motion, every: int) -> tuple[Array, float, float]:
-    """Every so many rates, the last among them, their sample rate, and where they begin."""
+    """Each `every`-th rate including the last, their sample rate, and the position at the first."""
     first = first_kept(len(motion.rate), every)
     rates = motion.rate[first::every]
     return rates, motion.sample_rate / every, float(motion.position[first])

@@ -21,16 +21,16 @@ from campaign.physics.friction import friction_models
 from campaign.result import Cell, Column, Curve, Figure, Mark, Panel, Table
 
 MOST_DRAWN = 5
-"""Models whose curves a figure shows: more have the same looks, or hide one another."""
+"""Most models with curves in a figure: more have equal looks, or hide one another."""
 MOST_LEFT_OVER = 4
-"""Models, the plain regression among them, whose residuals a figure shows."""
+"""Most models with residuals in a figure, including the plain regression."""
 FINE = 200
 """Rates of one direction at which friction is drawn."""
 PLAIN = "plain regression"
 
 
 def models_table(found: Whole) -> Table:
-    """Every model: on its rows, on blocks it did not see, on other motions."""
+    """Residuals of every model: on its rows, on held-out blocks, on other motions."""
     columns = [
         Column("model", "Friction model"),
         Column("numbers", "Numbers", exact=True),
@@ -62,7 +62,7 @@ def models_table(found: Whole) -> Table:
 
 
 def values_table(fit: Fit) -> Table:
-    """The numbers of a model with its intervals."""
+    """The numbers of a model with their intervals."""
     rows_: tuple[Mapping[str, Cell], ...] = tuple(
         {"number": name, "unit": each.unit, "value": each}
         for name, each in fit.fit.estimates.items()
@@ -75,7 +75,7 @@ def values_table(fit: Fit) -> Table:
 def figures(
     found: Whole, plain: InverseDynamics | None, unseen: Sequence[MotionPiece]
 ) -> Iterator[Figure]:
-    """Friction over rate, and what models leave over."""
+    """Figures of friction over rate, and of validation residuals."""
     yield _curve_figure(found, plain)
     if unseen:
         yield _left_figure(found, plain, unseen)
@@ -134,14 +134,14 @@ def _measured(found: Whole, best: Fit) -> tuple[Array, Array]:
 def _steady(fit: Fit, rate: Array) -> Array:
     model = friction_models()[fit.model.model]
     options = model.options.model_validate(fit.model.options(fit.values), context={"si": True})
-    found = np.full(len(rate), np.nan)
-    there = np.isfinite(rate)
-    found[there] = model.steady_state(options, rate[there])
-    return found
+    friction = np.full(len(rate), np.nan)
+    known = np.isfinite(rate)
+    friction[known] = model.steady_state(options, rate[known])
+    return friction
 
 
 def _plainest(plain: InverseDynamics) -> CandidateFit:
-    """Both directions of their own, without delay, as anybody would fit them."""
+    """The usual regression: each direction of its own, without delay."""
     return plain.tried[min(1, len(plain.tried) - 1)]
 
 
@@ -156,16 +156,16 @@ def _left_figure(
     found: Whole, plain: InverseDynamics | None, unseen: Sequence[MotionPiece]
 ) -> Figure:
     """Validation residuals of up to four models over time, rate and angle."""
-    told: list[tuple[str, Prediction]] = []
+    shown: list[tuple[str, Prediction]] = []
     if plain is not None:
         reference = _plainest(plain)
         if reference.predictions:
-            told.append((PLAIN, together(reference.predictions)))
-    fits = _drawn(found, MOST_LEFT_OVER - len(told))
-    told += [(each.model.name, together(each.predictions)) for each in fits]
+            shown.append((PLAIN, together(reference.predictions)))
+    fits = _drawn(found, MOST_LEFT_OVER - len(shown))
+    shown += [(each.model.name, together(each.predictions)) for each in fits]
     place = place_and_rate(unseen, found.filtering)
     panels = []
-    for name, prediction in told:
+    for name, prediction in shown:
         left = prediction.residuals
         title = f"{name}: {100 * prediction.relative:.2f} %"
         panels += [

@@ -49,22 +49,22 @@ from campaign.experiments.whole_model.residuals import (
 from campaign.physics.friction.unknowns import EXPONENT, Sizes
 
 DELAYS = 5.0
-"""Samples to either side between which the force's delay is looked for."""
+"""Largest delay of the force, to either side, in samples."""
 BLOCKS, EVERY = 12, 3
-"""Blocks of each recording, and which of them are left out once: every third."""
+"""Blocks of each recording, of which one in `EVERY` is held out."""
 STRONG = 10.0
-"""Difference of BIC from which on one model is told from another."""
+"""Difference of BIC from which two models are distinguished."""
 WIDE = 5.0
-"""How many times more or less than plain inverse dynamics the inertia may be."""
+"""Factor between the inertia of plain inverse dynamics and its bounds."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """One model, fitted.
+    """Fit of one model.
 
     Attributes:
-        extra: further terms that are linear: an offset, a spring.
-        held_out: relative residual of blocks that a fit did not see.
+        extra: further linear terms: an offset, a spring.
+        held_out: relative residual of held-out blocks.
         predictions: of the validation; empty without any.
         validation: relative residual there, and `gain`: by how much it is lower than the first
             model's; None without any.
@@ -82,14 +82,14 @@ class Fit:
 
     @property
     def faster_than_rows(self) -> bool:
-        """Whether what it has beyond a simpler model is faster than rows show."""
-        told = self.fit.estimates
+        """Whether its additions to a simpler model are faster than rows resolve."""
+        estimates = self.fit.estimates
         own = (n for n in self.model.numbers if n.lasts is not None and n.lasts.replaced)
-        return any(told[each.name].reason in UNRESOLVED for each in own)
+        return any(estimates[each.name].reason in UNRESOLVED for each in own)
 
     @property
     def values(self) -> dict[str, float]:
-        """SI, by name."""
+        """Values (SI) by name."""
         names = [unknown.name for unknown in self.fit.found.unknowns]
         return dict(zip(names, self.fit.values, strict=True))
 
@@ -105,7 +105,7 @@ class Whole:
 
     @property
     def as_good(self) -> tuple[str, ...]:
-        """Names of others that the motion does not tell from the best: BIC less than 10 above.
+        """Names of models that the motion does not separate from the best: BIC less than 10 above.
 
         A difference of 10 is strong evidence (Kass and Raftery 1995).
         """
@@ -117,11 +117,11 @@ class Whole:
 
 
 def _above(fits: Sequence[Fit]) -> list[float]:
-    """BIC of each less that of the one that does best on blocks it was not fitted to.
+    """BIC of each fit less that of the fit with the lowest held-out residual.
 
-    All on the rows that that one's are worth: a model that lacks something leaves correlated
-    residuals, and would count few. A model whose bristles bend faster than rows show takes no part:
-    it stands for a jump that is filtered, which a model without them has as well.
+    All use the effective number of rows of that fit: an incomplete model leaves correlated
+    residuals, and would count few rows. A model with bristles faster than rows resolve gets inf:
+    it represents a filtered jump, as a model without bristles does.
     """
     shown = [each for each in fits if not each.faster_than_rows]
     first = min(shown or fits, key=lambda each: each.held_out)
@@ -151,11 +151,11 @@ def find(
 ) -> Whole:
     """Fit every model, and the best one with its exponent free, too.
 
-    known: the delay as instruments along the wanted motion have it (s); None without any.
-    names: of the friction models. wanted: name of a model that is taken in place of the best.
+    known: delay (s) from instruments along the wanted motion; None without any.
+    names: of the friction models. wanted: name of a model to use instead of the best.
 
-    Raises ValueError where the motion does not slide in both directions, for a friction model that
-    does not say what is fitted of it, and where no model has the name that is wanted.
+    Raises ValueError if the motion does not slide in both directions, for an unknown friction model
+    or one that declares no unknowns, and if no model has the wanted name.
     """
     motions = [each.motion for each in pieces]
     sizes, inertia = _sizes(motions, filtering)
@@ -175,12 +175,12 @@ def find(
         add(model, inertia, starts)
     held = fits[_chosen(fits, wanted.removesuffix(EXPONENT_FREE))]
     if (free := held.model.with_exponent_free(held.values)) is not None:
-        add(free, held.values["inertia"], starts=1)  # from what was found
+        add(free, held.values["inertia"], starts=1)  # from the values of that fit
     return Whole(tuple(fits), _chosen(fits, wanted), filtering, tuple(pieces))
 
 
 def _chosen(fits: Sequence[Fit], wanted: str) -> int:
-    """Which one is wanted, or has the lowest BIC."""
+    """Index of the wanted model, else of that with the lowest BIC."""
     names = [each.model.name for each in fits]
     if not wanted:
         above = _above(fits)
@@ -191,7 +191,7 @@ def _chosen(fits: Sequence[Fit], wanted: str) -> int:
 
 
 def _sizes(motions: Sequence[Motion], filtering: FilterSettings) -> tuple[Sizes, float]:
-    """From plain inverse dynamics."""
+    """Sizes of friction and motion, and inertia (kg m^2), from plain inverse dynamics."""
     if missing := never_moved(motions, filtering.slowest):
         raise ValueError(f"the axis does not slide in the {missing[0]} direction")
     plain = structure(motions, [TERMS[name] for name in DIRECTIONAL], filtering)
@@ -238,7 +238,7 @@ def _fitted(
         display=lambda progress: say(progress.phase),
     )
     say("half the band")
-    # A loop that answers noise, and shapes that the model has not, weigh otherwise there.
+    # The answer of a loop to noise, and shapes beyond the model, have other weights there.
     other = refitted(unknowns, left_in(filtering.half_band, names, model), fit.found.shares)
     again = dict(zip(names, other, strict=True))
     doubt = doubt_of_delay(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
@@ -283,7 +283,7 @@ def _linear(term: Term, motions: Sequence[Motion], force: float) -> Unknown:
 
 
 def _left_out(count: int) -> NDArray[np.bool_]:
-    """Every third block."""
+    """Mask of the rows of every third block."""
     block = np.minimum(np.arange(count) * BLOCKS // max(count, 1), BLOCKS - 1)
     return np.asarray(block % EVERY == 1)
 
@@ -301,7 +301,7 @@ def _validated(
 def predicted(
     one: Fit, motions: Sequence[Motion], filtering: FilterSettings
 ) -> tuple[Prediction, ...]:
-    """What a fitted model says of other motions."""
+    """Predictions of a fitted model for other motions."""
     names = [unknown.name for unknown in one.fit.found.unknowns]
     made = Residuals(names, one.model, one.extra, motions, filtering, steps_between(filtering))
     values = one.fit.values

@@ -1,1 +1,1 @@
-"""What trials of a run make of a drive's frequency response."""
+"""Frequency response of a drive from trials of a run."""

@@ -1,7 +1,7 @@
 """Frequency response of any motion: modes, margins, distortion, two masses.
 
-Sines, repeated odd multisines and any other recording each give a response; a rational function
-with a delay tells its modes, and two inertias on a spring what the sensors' places allow.
+Sines, repeated odd multisines and any other recording each give a response. A rational function
+with a delay determines its modes; two inertias on a spring, what the sensors' places allow.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ MORE_PHASES = (
 )
 LOWER = "excite further below the antiresonance, above what friction holds"
 SURELY = 3.0
-"""Standard deviations by which a delay lies below zero where it is told."""
+"""Standard deviations by which a reported delay lies below zero."""
 MEANINGS = (
     ("total_inertia", "Inertia of the whole drive, seen at the load.", "kg m^2", LOWER),
     ("motor_inertia", "Inertia that the torque drives directly.", "kg m^2", LOUDER),
@@ -75,7 +75,7 @@ MEANINGS = (
     ("antiresonance", "Frequency of what lies behind the spring alone.", "Hz", LOUDER),
     ("antiresonance_damping", "Damping ratio of what lies behind the spring alone.", "", LOUDER),
 )
-"""Of a two-mass drive: attribute, meaning, unit, what to measure next."""
+"""Numbers of a two-mass drive: attribute, meaning, unit, what to measure next."""
 APPENDAGE = {
     "load_inertia": "appendage.inertia",
     "antiresonance": "appendage.frequency",
@@ -109,20 +109,20 @@ class FrequencyResponseOptions(Options):
 
 
 def identified(data: TestData) -> Result:
-    """Modes, margins and inertias. Raises ValueError where no trial gives a response."""
+    """Modes, margins and inertias. Raises ValueError if no trial gives a response."""
     options: FrequencyResponseOptions = data.model
     how = Reading(options.excited, options.estimator, options.resolution, options.period)
     measured, remarks = sources(data.trials, data.bench, how)
     if not measured:
         raise ValueError(" ".join(dict.fromkeys(remarks)) or "no trial gives a response")
     band = Band(options.lowest, options.highest, options.order)
-    found = [found_in(each, band) for each in measured]
-    best = best_source(found)
-    found.sort(key=lambda each: (each is not best, -each.source.rms))  # what tells most comes first
+    fitted = [found_in(each, band) for each in measured]
+    best = best_source(fitted)
+    fitted.sort(key=lambda each: (each is not best, -each.source.rms))  # most informative first
     torque = known_uncertainty(data.bench, TORQUE_CONSTANT)
-    told = masses(best, data.bench, options.place, band, torque, found)
-    parameters = tuple(_parameters(told, best or found[0]))
-    fits = tuple(models(found, told, band))
+    two_masses = masses(best, data.bench, options.place, band, torque, fitted)
+    parameters = tuple(_parameters(two_masses, best or fitted[0]))
+    fits = tuple(models(fitted, two_masses, band))
     unseen: Sequence[TrialData] = ()
     if data.validation:
         unseen, why = usable(data.validation)
@@ -130,44 +130,44 @@ def identified(data: TestData) -> Result:
             raise ValueError(f"of the validation {why}")
     validation = validated(data.trials, unseen, data.bench, how, fits)
     tables = (
-        sources_table([each.source for each in found]),
-        masses_table(told),
-        correlations_table(told, _told_names(parameters)),
-        modes_table(found),
-        *loop_tables(found),
-        *distortion_tables([each.source for each in found]),
-        fits_table(found, told),
+        sources_table([each.source for each in fitted]),
+        masses_table(two_masses),
+        correlations_table(two_masses, _told_names(parameters)),
+        modes_table(fitted),
+        *loop_tables(fitted),
+        *distortion_tables([each.source for each in fitted]),
+        fits_table(fitted, two_masses),
         *validation_tables(validation),
     )
     return Result(
         tables=tuple(each for each in tables if each is not None and each.rows),
         figures=(
             *validation_figures(validation),
-            *figures(found, told),
-            *residual_figures(found, fits),
+            *figures(fitted, two_masses),
+            *residual_figures(fitted, fits),
         ),
-        findings=tuple(_findings(found, parameters)),
+        findings=tuple(_findings(fitted, parameters)),
         notes=(
             *_undetermined(parameters),
-            *_notes(found, told, remarks),
+            *_notes(fitted, two_masses, remarks),
             *(f"Of the validation: {each}" for each in validation.remarks),
         ),
         identified=IdentifiedRig(
             parameters,
-            correlations=_correlations(told, parameters),
+            correlations=_correlations(two_masses, parameters),
             unseen=_unseen(validation),
         ),
     )
 
 
 def _unseen(validation: Validation) -> Unseen | None:
-    """Of the model that does best: the output that it makes of the unseen torque."""
+    """Error of the best model's output for unseen torque."""
     outputs = [each.output for each in validation.predictions if each.output is not None]
     return Unseen(min(each.value for each in outputs), "motion") if outputs else None
 
 
 def _correlations(told: Masses, parameters: Sequence[Parameter]) -> Mapping[tuple[str, str], float]:
-    """By scatter, of the numbers that are told."""
+    """Correlations by scatter, of the numbers with an interval."""
     if told.drive is None:
         return {}
     names = _told_names(parameters)
@@ -195,17 +195,17 @@ def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:
     keys = {"total_inertia": "axis.inertia", **(APPENDAGE if hangs_on_load else {})}
     passed = admitted_together({each[0]: getattr(told.axis, each[0]) for each in MEANINGS}, {})
     for name, meaning, unit, advice in MEANINGS:
-        # A damping that friction adds to may be left open alone: then the others are told.
+        # Friction may leave only a damping open; then the other numbers are reported.
         key = "" if told.bent else keys.get(name, "")
         yield Parameter(passed[name], meaning, unit, key, AMPLITUDES if told.bent else advice)
 
 
 def _local(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
-    """Numbers of a mode where no model of the whole drive fits, by name: extrema, of too few
-    realisations, and else a mode on top of a smooth response.
+    """Numbers of a mode by name, without a model of the whole drive: extrema, of too few
+    realisations, else a mode on top of a smooth response.
 
     The antiresonance of the latter is that of a part behind the spring only for a sensor at the
-    driven inertia. An extremum below the resonance is there for no other.
+    driven inertia. Only that sensor shows an extremum below the resonance.
     """
     if too_few(best.source):
         extrema = best.modes.get("motor", best.modes.get("load", ()))
@@ -214,14 +214,14 @@ def _local(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
         return {}
     side: Side = "motor" if "motor" in best.local else "load"
     mode = best.local[side]
-    found = {"resonance": mode.frequency, "resonance_damping": mode.damping_ratio}
+    estimates = {"resonance": mode.frequency, "resonance_damping": mode.damping_ratio}
     if side == "motor" or told.places.get(side) == "motor":
-        found["antiresonance"] = mode.antiresonance
-    return {name: replace(each, name=name) for name, each in found.items()}
+        estimates["antiresonance"] = mode.antiresonance
+    return {name: replace(each, name=name) for name, each in estimates.items()}
 
 
 def _local_of_axis(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
-    """The same, with friction's part, which extrema have."""
+    """Numbers of `_local` with friction's part; extrema include it already."""
     odd = 0.0 if too_few(best.source) else odd_distortion(best.source)
     return {name: by_rule(each, odd) for name, each in _local(told, best).items()}
 
@@ -269,7 +269,7 @@ def _notes(found: Sequence[FrequencyFit], told: Masses, remarks: Sequence[str]) 
 
 
 def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
-    """Of rates that answer before their torque, which no drive does."""
+    """Notes on rates that respond before their torque, which no drive does."""
     for each in found:
         for side, chosen in each.fits.items():
             fit = chosen.fit
@@ -285,7 +285,7 @@ def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
 
 
 def _undetermined(parameters: Sequence[Parameter]) -> Iterator[str]:
-    """Where no number is determined: which, why, and what to measure."""
+    """Notes, if no number is determined: which, why, and what to measure."""
     if any(each.estimate.origin is Origin.MEASURED for each in parameters):
         return
     alike: dict[tuple[str, str], list[str]] = {}

@@ -2,9 +2,9 @@
 
 A best linear approximation belongs to its excitation (Pintelon and Schoukens, "System
 Identification: A Frequency Domain Approach" (2012), 3.4): its inertia is that of the response, not
-that of the axis. The difference is a bias: no scatter shows it, and the level of distortion is
-none of its bounds, as friction that acts like a spring or a damper distorts little. What tells it
-is how the numbers move with the excitation: as its rms rises, friction's share falls.
+that of the axis. The difference is a bias that no scatter shows. The level of distortion does not
+bound it, because friction that acts like a spring or a damper distorts little. The change of the
+numbers with the excitation shows it: as its rms rises, friction's share falls.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from campaign.experiments.responses.sources import Source
 from campaign.reason import Cause
 
 BENT = 0.03
-"""Odd distortion over the output from which on one amplitude tells no number of the axis."""
+"""Odd distortion over the output above which one amplitude determines no number of the axis."""
 SLOWEST = 0.5
-"""Least power of the rms by which friction's share falls: between that of bristles, which does not
-fall before they slip, and 1, that of Coulomb friction."""
+"""Least exponent by which friction's share falls with the rms: between 0, of bristles that do not
+slip, and 1, of Coulomb friction."""
 FRICTION = "friction, at this excitation"
 UNKNOWN = Cause(
     "friction at one amplitude",
@@ -42,21 +42,21 @@ BY_RULE = {
     "resonance": 0.05,
     "antiresonance": 0.05,
 }
-"""Friction's part (1 sigma, relative) over the odd distortion, where that is below `BENT`: of
-simulated rigs with bristles that slip. A rule of thumb: no theory bounds the one by the other."""
+"""Relative standard uncertainty by friction over the odd distortion, for distortion below `BENT`:
+from simulated rigs with slipping bristles. A rule of thumb: no theory bounds one by the other."""
 LEAST = 0.25
-"""of that part, or of that at `BENT`, stays where a second amplitude tells less: the two may agree
-by chance."""
+"""Share of that part, or of that at `BENT`, that remains if a second amplitude shows less: the two
+may agree by chance."""
 NUMBERS = (*BY_RULE, "damping", "resonance_damping", "antiresonance_damping")
-"""Numbers of a drive that friction shifts; what it adds to a damping, no level tells."""
+"""Numbers of a drive that friction shifts. No level of distortion shows its part in a damping."""
 
 
 @dataclass(frozen=True)
 class Weaker:
-    """What a response to less excitation tells of the same drive.
+    """Drive from a response to less excitation.
 
     Attributes:
-        ratio: of the rms of the stronger excitation to this one's, above 1.
+        ratio: rms of the stronger excitation over this one's, above 1.
     """
 
     drive: TwoMass
@@ -64,18 +64,18 @@ class Weaker:
 
 
 def odd_distortion(source: Source) -> float:
-    """Over the output, as far as it is told from the noise: zero where it is not."""
+    """Odd distortion over the output; zero if it does not exceed the noise."""
     levels = [total(each.distortion, "odd") for each in source.best.values() if each.distortion]
-    told = [level.value for level in levels if level.kind == "number"]
-    return max((value for value in told if math.isfinite(value)), default=0.0)
+    sizes = [level.value for level in levels if level.kind == "number"]
+    return max((value for value in sizes if math.isfinite(value)), default=0.0)
 
 
 def of_axis(drive: TwoMass, odd: float, weaker: Sequence[Weaker]) -> TwoMass:
-    """The drive with numbers of the axis in place of the response's.
+    """Drive with numbers of the axis in place of the response's.
 
     Args:
-        odd: distortion over the output that is told from the noise; zero where none is.
-        weaker: what responses to less excitation tell; none with one amplitude.
+        odd: odd distortion over the output that exceeds the noise, or zero.
+        weaker: drives from responses to less excitation; empty with one amplitude.
     """
     if not odd:
         return drive
@@ -90,7 +90,7 @@ def of_axis(drive: TwoMass, odd: float, weaker: Sequence[Weaker]) -> TwoMass:
 
 
 def by_rule(one: Estimate, odd: float) -> Estimate:
-    """Of the axis, from one amplitude, with this odd distortion; not determined where it is much.
+    """Number of the axis from one amplitude with this odd distortion; undetermined if it is large.
 
     `one`: named as the number of a drive.
     """
@@ -102,15 +102,15 @@ def by_rule(one: Estimate, odd: float) -> Estimate:
 
 
 def with_part(one: Estimate, part: float) -> Estimate:
-    """With friction's part (1 sigma)."""
+    """Estimate with friction's part (1 sigma)."""
     return admitted(shifted_by(one, FRICTION, part))
 
 
 def _extrapolated(one: Estimate, name: str, weaker: Sequence[Weaker]) -> Iterator[float]:
-    """What friction may still have in a number, as each weaker excitation has it (1 sigma).
+    """Friction's possible remaining part (1 sigma) in a number, by each weaker excitation.
 
     A share that falls as rms**-p is (weaker - stronger) / (ratio**p - 1) at the stronger one. The
-    difference is known as well as both numbers are.
+    uncertainty of the difference is that of both numbers.
     """
     for each in weaker:
         other = getattr(each.drive, name)

@@ -29,7 +29,7 @@ from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 
 TOLD_APART = 10.0
-"""Schwarz' criterion by which one place of the sensor must fit better than the other."""
+"""Difference of Schwarz' criterion that distinguishes two places of the sensor."""
 AMBIGUOUS = Cause(
     "place of the sensor not known",
     "the sensor may be at the driven inertia or behind the spring: say which (place), or excite "
@@ -43,14 +43,14 @@ NOTHING_FITTED = Cause("no response fitted", "no response could be fitted")
 NO_FIT = Cause("fit failed", "{error}")
 
 NARROWER = (2.0, 4.0, 8.0)
-"""times the first frequency: from there on two inertias are tried where friction bends the rest."""
+"""Lower ends of narrower bands over the first frequency, if friction bends the response."""
 WEAKER = 0.8
 """Share of the strongest excitation below which another one is weaker."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """Of what is fitted (Hz), and the highest order of a denominator."""
+    """Band of a fit (Hz), and the highest order of a denominator."""
 
     lowest: float
     highest: float
@@ -59,14 +59,14 @@ class Band:
 
 @dataclass(frozen=True)
 class FrequencyFit:
-    """What one source comes to.
+    """Fit of one source.
 
     Attributes:
-        fits, modes: by side; a side is missing where nothing could be fitted. Modes of too few
-            realisations are extrema of the response, with friction's part.
+        fits, modes: by side; sides without a fit are missing. Modes of too few realisations are
+            extrema of the response, with friction's part.
         local: modes on top of a response that no function fits, by side.
         margins: of its loop.
-        remarks: sentences: what could not be found, and why.
+        remarks: sentences on missing results and their reasons.
     """
 
     source: Source
@@ -79,15 +79,15 @@ class FrequencyFit:
 
 @dataclass(frozen=True)
 class Masses:
-    """The two-mass drive, and where the sensors are taken to be.
+    """The two-mass drive, and the assumed places of the sensors.
 
     Attributes:
-        drive: with the response's numbers; None where it is not that of one, and `reason` says why.
-        axis: the same with numbers of the axis: their intervals hold friction's part, too.
+        drive: with the response's numbers; None, with a `reason`, if the response fits none.
+        axis: the same with numbers of the axis; their intervals include friction's part.
         places: `motor` for a sensor at the driven inertia, `load` behind the spring, by side.
-        how: how the places are known, in words.
-        lowest: frequency from which on it was fitted (Hz), where it is no model of the whole band.
-        bent: where numbers of the axis cannot be told from the response's, why: a sentence.
+        how: source of the places, in words.
+        lowest: lowest fitted frequency (Hz), if the drive is no model of the whole band.
+        bent: why the response does not determine numbers of the axis: a sentence.
     """
 
     drive: TwoMass | None
@@ -101,7 +101,7 @@ class Masses:
 
     @property
     def is_bent(self) -> bool:
-        """Whether numbers of the axis are others than the response's."""
+        """Whether numbers of the axis differ from the response's."""
         return self.axis is not self.drive
 
 
@@ -137,7 +137,7 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
 
 
 def too_few(source: Source) -> Reason:
-    """Why nothing is fitted to repeated multisines; false where there are enough."""
+    """Why nothing is fitted to repeated multisines; false if there are enough."""
     few = [best.excitation.realisations for best in source.best.values()]
     if min(few, default=FEWEST_REALISATIONS) < FEWEST_REALISATIONS:
         return TOO_FEW(realisations=min(few), fewest=FEWEST_REALISATIONS)
@@ -147,18 +147,18 @@ def too_few(source: Source) -> Reason:
 def _extrema(source: Source, side: Side, band: Band) -> tuple[Mode, ...]:
     measured, scatter = source.responses[side], relative_scatter(source.best[side])
     kept = (measured.frequency >= band.lowest) & (measured.frequency <= band.highest)
-    told = extrema(
+    modes = extrema(
         measured.frequency[kept],
         np.abs(measured.values[kept]),
         None if scatter is None else scatter[kept],
     )
-    # Much friction damps a mode away, and has extrema of its own.
+    # Much friction damps a mode out, and has its own extrema.
     odd = odd_distortion(source)
-    return tuple(replace(mode, frequency=by_rule(mode.frequency, odd)) for mode in told)
+    return tuple(replace(mode, frequency=by_rule(mode.frequency, odd)) for mode in modes)
 
 
 def best_source(found: Sequence[FrequencyFit]) -> FrequencyFit | None:
-    """From which parameters are told: one that fits, multisines before sines before the rest.
+    """Source of the parameters, by: no misfit, most sides, multisines before sines before records.
 
     Of several multisines the strongest: the share of friction in it is the least.
     """
@@ -187,24 +187,24 @@ def masses(
     Args:
         place: `driven`, `behind` or `auto`, of the load's sensor.
         torque: relative standard uncertainty of the torque constant, if it is known.
-        others: further sources: one of less excitation tells how far friction bends the response.
+        others: further sources: one of less excitation shows friction's effect on the response.
     """
     if found is None:
         return Masses(None, None, NOTHING_FITTED())
     source = found.source
     first = min(float(each.frequency[0]) for each in source.responses.values())
     try:
-        told = _placed(source, bench, place, band, torque)
+        result = _placed(source, bench, place, band, torque)
         for factor in () if band.lowest > 0 else NARROWER:
-            if told.drive is None or not told.drive.misfit:
+            if result.drive is None or not result.drive.misfit:
                 break
             higher = replace(band, lowest=factor * first)
             other = _narrower(source, bench, place, higher, torque)
             if other is not None and other.drive is not None and not other.drive.misfit:
-                told, band = replace(other, lowest=higher.lowest), higher
-        if told.drive is None or told.drive.misfit:
-            return replace(told, axis=told.drive)
-        return _with_axis(told, source, [each.source for each in others], band)
+                result, band = replace(other, lowest=higher.lowest), higher
+        if result.drive is None or result.drive.misfit:
+            return replace(result, axis=result.drive)
+        return _with_axis(result, source, [each.source for each in others], band)
     except (ValueError, np.linalg.LinAlgError) as error:
         return Masses(None, source, NO_FIT(error=str(error)))
 
@@ -212,7 +212,7 @@ def masses(
 def _narrower(
     source: Source, bench: Bench, place: str, band: Band, torque: float | None
 ) -> Masses | None:
-    """In less of the band; None where too little of it is left."""
+    """Masses in a narrower band; None if too little of it is left."""
     try:
         return _placed(source, bench, place, band, torque)
     except ValueError:
@@ -252,7 +252,7 @@ def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float 
 
 
 def _with_axis(told: Masses, source: Source, others: Sequence[Source], band: Band) -> Masses:
-    """With numbers of the axis: a response to less excitation tells friction's part in them."""
+    """Add numbers of the axis: a response to less excitation determines friction's part in them."""
     if told.drive is None:
         return told
     odd = odd_distortion(source)
@@ -275,7 +275,7 @@ def _with_axis(told: Masses, source: Source, others: Sequence[Source], band: Ban
 
 
 def _weaker_drive(told: Masses, other: Source, band: Band) -> TwoMass:
-    """Of a weaker excitation, from where it fits best: friction bends more of its band."""
+    """Drive of a weaker excitation, in its best-fitting band: friction bends more of it."""
     first = min(float(each.frequency[0]) for each in other.responses.values())
     tried = []
     for lowest in {band.lowest, *(max(factor * first, band.lowest) for factor in NARROWER)}:

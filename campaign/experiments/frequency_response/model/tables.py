@@ -28,7 +28,7 @@ from campaign.text import words
 
 
 def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
-    """The function chosen for each response, and the two masses beside it."""
+    """Function chosen for each response, and the two masses beside it."""
     rows: list[dict[str, Any]] = []
     for each in found:
         for side, chosen in each.fits.items():
@@ -84,19 +84,19 @@ def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
 
 def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
     """Resonances and antiresonances."""
-    told: list[tuple[str, str, str, Estimate, Estimate | None]] = []
+    entries: list[tuple[str, str, str, Estimate, Estimate | None]] = []
     for each in found:
         for side, modes in each.modes.items():
             for mode in modes:
                 kind = "antiresonance" if mode.is_zero else "resonance"
-                told.append((each.source.name, side, kind, mode.frequency, mode.damping))
+                entries.append((each.source.name, side, kind, mode.frequency, mode.damping))
     smooth = "on top of a smooth response"
     for each in found:
         for side, one in each.local.items():
             own, kind = (each.source.name, side), f"resonance, {smooth}"
-            told.append((*own, kind, one.frequency, one.damping_ratio))
-            told.append((*own, f"anti{kind}", one.antiresonance, None))
-    if not told:
+            entries.append((*own, kind, one.frequency, one.damping_ratio))
+            entries.append((*own, f"anti{kind}", one.antiresonance, None))
+    if not entries:
         return None
     names = ("source", "side", "kind", "frequency", "damping")
     return Table(
@@ -109,25 +109,25 @@ def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
             Column("frequency", "Frequency", "Hz", "Hz"),
             Column("damping", "Damping ratio", ""),
         ),
-        tuple(dict(zip(names, each, strict=True)) for each in told),
+        tuple(dict(zip(names, each, strict=True)) for each in entries),
     )
 
 
 def loop_tables(found: Sequence[FrequencyFit]) -> Iterator[Table]:
     """Bandwidth and margins of each loop, as of a sweep of sines."""
     loops = [
-        Sweep({NAME.name: each.source.name}, "closed", each.source.name, each.source.closed, told)
+        Sweep({NAME.name: each.source.name}, "closed", each.source.name, each.source.closed, servo)
         for each in found
-        if each.source.closed is not None and (told := each.margins) is not None
+        if each.source.closed is not None and (servo := each.margins) is not None
     ]
     if loops:
         yield from margin_tables(loops, (NAME,))
 
 
 def masses_table(masses: Masses) -> Table | None:
-    """The drive of the response, and that of the axis where friction makes it another.
+    """Drive of the response, and of the axis if friction makes it different.
 
-    None where it is no model of the response, and for one inertia, unless friction is in it.
+    None if it is no model of the response, and for one inertia without friction's part.
     """
     drive, axis = masses.drive, masses.axis
     if drive is None or axis is None or drive.misfit or (drive.rigid and not masses.is_bent):
@@ -170,12 +170,12 @@ def masses_table(masses: Masses) -> Table | None:
 
 
 def drive_name(drive: TwoMass) -> str:
-    """What was fitted, for people."""
+    """Name of the fitted drive, in words."""
     return "one inertia" if drive.rigid else "two inertias"
 
 
 def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
-    """Pairs of the numbers of the two masses that have these names, the most alike first."""
+    """Correlations of the two-mass numbers with these names, the largest first."""
     if masses.drive is None:
         return None
     pairs = [
@@ -207,7 +207,7 @@ FINE = 800
 
 
 def figures(found: Sequence[FrequencyFit], masses: Masses) -> Iterator[Figure]:
-    """All of them, the most telling first."""
+    """All figures, the most informative first."""
     sources = [each.source for each in found]
     yield from response_figures(
         sources,
@@ -220,7 +220,7 @@ def figures(found: Sequence[FrequencyFit], masses: Masses) -> Iterator[Figure]:
     loops = [(each.source.name, each.source.closed, each.margins) for each in found]
     closed = [(name, name, loop) for name, loop, _ in loops if loop is not None]
     if closed:
-        margins = [told for _, loop, told in loops if loop is not None]
+        margins = [servo for _, loop, servo in loops if loop is not None]
         yield from closed_loop_figures(closed, margins)
     yield coherence_figure(sources)
 

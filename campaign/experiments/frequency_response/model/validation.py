@@ -35,22 +35,22 @@ from campaign.units import torque_text
 
 FUNCTION = "rational function"
 FEWEST_LINES = 3
-"""at which a prediction is held against a response."""
+"""Fewest frequencies of a prediction that is compared with a response."""
 OTHER_SIZE = 1.2
-"""Ratio of two excitations' rms from which on a response with friction is not the same."""
+"""Ratio of two excitations' rms above which responses with friction differ."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """A fitted response of one sensor, whatever it was fitted as.
+    """Fitted response of one sensor, of any kind.
 
     Attributes:
-        source: what it was fitted to; `side`: the sensor.
-        lowest, highest: of the band that it was fitted in (Hz).
-        value, jacobian: response (n,), and its derivative by the parameters (n, p), by Hz.
+        source: source of the fit; `side`: the sensor.
+        lowest, highest: band of the fit (Hz).
+        value, jacobian: response (n,), its derivative by the parameters (n, p); of frequency (Hz).
         covariance: of the parameters, shape (p, p).
         poles: (rad/s).
-        misfit: why it is no model of what it was fitted to; none where it may be one.
+        misfit: why it is no model of its source; none if it may be one.
     """
 
     name: str
@@ -70,9 +70,9 @@ class Prediction:
     """One response that was not fitted, and one model.
 
     Attributes:
-        source: the unseen response's.
-        output: relative error of the simulated output there; None where none could be simulated.
-        first: that of the first recording.
+        source: source of the unseen response.
+        output: relative error of the simulated output there; None without a simulation.
+        first: simulated output of the first recording.
         is_angle: whether the output is an angle, and no rate.
     """
 
@@ -86,10 +86,10 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Validation:
-    """All predictions, the simulated outputs of what was fitted, and sentences.
+    """All predictions, the simulated outputs of fitted recordings, and sentences.
 
     Attributes:
-        own: by model: relative error of the output simulated from the recordings it was fitted to.
+        own: by model: relative error of the output simulated from its own recordings.
     """
 
     predictions: tuple[Prediction, ...] = ()
@@ -98,7 +98,7 @@ class Validation:
 
 
 def models(found: Sequence[FrequencyFit], told: Masses, band: Band) -> Iterator[Model]:
-    """All that were fitted, those of the two masses after the functions of their source."""
+    """All fitted models, those of the two masses after the functions of their source."""
     for each in found:
         for side, chosen in each.fits.items():
             fit = chosen.fit
@@ -143,19 +143,19 @@ def validated(
     how: Reading,
     fits: Sequence[Model],
 ) -> Validation:
-    """Every model held against what was not fitted; without any against its own recordings.
+    """Compare models with unseen responses and with their own recordings.
 
-    Raises ValueError where nothing of the validation is a response.
+    Raises ValueError if the validation has no response.
     """
     own = tuple(_own(fitted, bench, how, fits))
     if not unseen:
         return Validation(own=own)
-    told, remarks = sources(unseen, bench, how)
+    responses, remarks = sources(unseen, bench, how)
     remarks += _same_course(fitted, unseen)
-    if not told:
+    if not responses:
         raise ValueError(f"of the validation {' '.join(remarks) or 'no trial gives a response'}")
-    found = []
-    for source in told:
+    predictions = []
+    for source in responses:
         for side, measured in source.responses.items():
             for model in _nearest(fits, source, side):
                 one = _predicted(source, model, measured, unseen, bench, how)
@@ -164,23 +164,23 @@ def validated(
                         f"{source.name}: too few frequencies lie where models were fitted."
                     )
                     continue
-                found.append(one)
+                predictions.append(one)
                 remarks += _other_size(source, model.source)
-    return Validation(tuple(found), own, tuple(dict.fromkeys(remarks)))
+    return Validation(tuple(predictions), own, tuple(dict.fromkeys(remarks)))
 
 
 def _same_course(fitted: Sequence[TrialData], unseen: Sequence[TrialData]) -> list[str]:
-    """That what distorts repeats itself with a multisine, so that only noise is new."""
+    """Remark on unseen multisines with fitted phases: distortion repeats, and only noise is new."""
     own = {str(each.trial.task.command) for each in fitted if _is_multisine(each)}
     again = [each for each in unseen if _is_multisine(each) and str(each.trial.task.command) in own]
     if not again:
         return []
-    told = (
+    remark = (
         f"{len(again)} of its {len(unseen)} trials have a multisine that the model was fitted to, "
         "with the same phases. What friction adds repeats itself, so that differences look too "
         "small. Other phases (another seed) would show them."
     )
-    return [told]
+    return [remark]
 
 
 def _is_multisine(trial: TrialData) -> bool:
@@ -188,17 +188,17 @@ def _is_multisine(trial: TrialData) -> bool:
 
 
 def _nearest(fits: Sequence[Model], source: Source, side: Side) -> list[Model]:
-    """Of each name the model whose excitation was most alike; the first one where none says it."""
-    found = []
+    """Model of each name with the most similar excitation; the first if sizes are unknown."""
+    nearest = []
     for name in dict.fromkeys(each.name for each in fits):
         some = [each for each in fits if each.name == name and each.side == side]
         if some:
-            found.append(min(some, key=lambda each: size_difference(each.source, source)))
-    return found
+            nearest.append(min(some, key=lambda each: size_difference(each.source, source)))
+    return nearest
 
 
 def size_difference(one: Source, other: Source) -> float:
-    """How unlike two excitations are in size, as a logarithm; infinite where one has none."""
+    """Difference of two excitations in size, as a logarithm; infinite if one has no size."""
     if one.rms <= 0 or other.rms <= 0:
         return math.inf
     return abs(math.log(one.rms / other.rms))
@@ -249,18 +249,18 @@ def _own(
 def _simulated(
     trials: Sequence[TrialData], bench: Bench, how: Reading, model: Model
 ) -> list[Simulated]:
-    """What the recorded torque makes of the model, beside what was recorded; whatever is too short
-    is left out.
+    """Outputs simulated from the recorded torque, beside the recorded ones; short stretches are
+    left out.
     """
-    found = []
+    outputs = []
     for trial in trials:
         try:
-            told = signals(trial, bench, how.excited)
+            recorded = signals(trial, bench, how.excited)
         except ValueError:
             continue
-        if model.side in told.answers:
-            found += list(_stretches(told, model))
-    return found
+        if model.side in recorded.answers:
+            outputs += list(_stretches(recorded, model))
+    return outputs
 
 
 def _stretches(told: Signals, model: Model) -> Iterator[Simulated]:

@@ -25,9 +25,9 @@ FINE = 800
 """Frequencies at which a model is drawn."""
 TIME = Axis("Time", "s", "s")
 SELDOM = math.sqrt(-math.log(0.05))
-"""Size of a complex error over its root of the mean square that chance passes once in twenty."""
+"""Complex error over its root mean square that chance exceeds once in twenty."""
 LAGS = 30
-"""of an autocorrelation, at most."""
+"""Most lags of an autocorrelation."""
 MODEL = Column("model", "Model", exact=True)
 OF_LINES = Cause("over these lines", "a mean over these lines; their deviations show how it varies")
 IN_LAST_COLUMN = Cause("deviation in a column", "the last column has its uncertainty")
@@ -118,8 +118,8 @@ def _lines(predictions: Sequence[Prediction]) -> Table:
 
 
 def _outputs(validation: Validation) -> Table:
-    told = [("fitted", model.source, model, error) for model, error in validation.own]
-    told += [
+    errors = [("fitted", model.source, model, error) for model, error in validation.own]
+    errors += [
         ("unseen", each.source, each.model, each.output)
         for each in validation.predictions
         if each.output is not None
@@ -134,7 +134,7 @@ def _outputs(validation: Validation) -> Table:
             "highest": model.highest,
             "error": error,
         }
-        for data, source, model, error in told
+        for data, source, model, error in errors
     ]
     return Table(
         "output-error",
@@ -161,9 +161,9 @@ def validation_figures(validation: Validation) -> Iterator[Figure]:
         sides.setdefault((each.source.name, each.model.side), []).append(each)
     for number, ((name, side), some) in enumerate(sides.items(), start=1):
         yield _response(f"prediction-{number}-{side}", name, side, some)
-        told = [each for each in some if each.first is not None]
-        if told:
-            yield _over_time(f"output-{number}-{side}", name, side, told)
+        simulated = [each for each in some if each.first is not None]
+        if simulated:
+            yield _over_time(f"output-{number}-{side}", name, side, simulated)
 
 
 def _response(key: str, name: str, side: str, some: Sequence[Prediction]) -> Figure:
@@ -187,11 +187,11 @@ def _response(key: str, name: str, side: str, some: Sequence[Prediction]) -> Fig
         own,
         marks=(Mark("one line of twenty", y=SELDOM),),
     )
-    told = "; ".join(f"{each.model.name}: {each.against.verdict}" for each in some)
+    verdicts = "; ".join(f"{each.model.name}: {each.against.verdict}" for each in some)
     return Figure(
         key,
         f"Prediction of the unseen response {name}, sensor of the {side}",
-        f"Points with 95 % bars: measured data that were not fitted. {told}.",
+        f"Points with 95 % bars: measured data that were not fitted. {verdicts}.",
         "Gain and phase of an unseen response with predictions, and differences in deviations.",
         (gain, phase, *([left] if own else [])),
     )
@@ -226,7 +226,7 @@ def _over_time(key: str, name: str, side: str, some: Sequence[Prediction]) -> Fi
 
 
 def residual_figures(found: Sequence[FrequencyFit], fits: Sequence[Model]) -> Iterator[Figure]:
-    """What fits leave of the response they were fitted to, over frequency and from line to line."""
+    """Residuals of fits to their responses, over frequency and from line to line."""
     for number, each in enumerate(found, start=1):
         for side in each.source.responses:
             own = [m for m in fits if m.source is each.source and m.side == side]
