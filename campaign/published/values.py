@@ -32,30 +32,30 @@ Mark = Literal["inconsistent", "not reproducible"]
 
 
 class Part(Options):
-    """What a table, a row or a column says about its cells; what is inside wins."""
+    """Data of a table, row or column on its cells; the innermost has priority."""
 
     symbol: str = ""
-    """How the document writes it, e.g. σ2."""
+    """Symbol in the document, e.g. σ2."""
     quantity: str | None = None
-    """The word a finding uses for it, e.g. stabilization_error."""
+    """Its name in a finding, e.g. stabilization_error."""
     unit: str | None = None
-    """The unit of the printed number; absent for a number without one."""
+    """Unit of the printed number; absent for a number without unit."""
     relation: Relation | None = None
-    """What the document claims: this value (the default), near it, at most or at least it; or that
-    it is a place in an order, or a mark on a scale."""
+    """Claim of the document: this value (default), near it, at most or at least it, a rank in an
+    order, or a mark on a scale."""
     decimals: int | None = Field(default=None, ge=0, le=12)
     """Printed digits after the point."""
     conditions: dict[str, str | int | float | bool] = {}
-    """What a finding must state to be this number: text, numbers, or text with a unit."""
+    """Conditions of a matching finding: text, numbers, or text with a unit."""
 
 
 class Names(Options):
-    """What the names of a table's rows, or columns, are values of."""
+    """Condition that the names of rows or columns are values of."""
 
     condition: str
-    """The condition that a name gives the value of, e.g. compensation, frequency."""
+    """Name of the condition, e.g. compensation, frequency."""
     unit: str = ""
-    """The unit of names that are numbers."""
+    """Unit of names that are numbers."""
     names: tuple[str, ...] = ()
     """The columns in printed order (rows are named by their cells)."""
 
@@ -64,14 +64,14 @@ class MarkOptions(Options):
     """A remark on some cells of a table."""
 
     cells: tuple[str, ...] = Field(min_length=1)
-    """`row/column` or `row`; `*` stands for all of them."""
+    """`row/column` or `row`; `*` means all of them."""
     status: Mark | None = None
-    """Whether the document contradicts itself there, or nobody could reproduce it."""
+    """`inconsistent`: the document contradicts itself; or `not reproducible`."""
     repeats: tuple[str, ...] = ()
-    """Tables, rows or cells whose condition they have too, or that they follow from: fitted there,
-    or seen there, is fitted or seen here."""
+    """Tables, rows or cells with the same condition, or from which these cells follow: the status
+    fitted or seen applies here too."""
     reason: str = Field(min_length=1)
-    """Why, or what to know about it."""
+    """Reason, or remark."""
 
 
 class TableOptions(Part):
@@ -83,17 +83,17 @@ class TableOptions(Part):
     ]
     """Its number: 5.8, or `figure 5.14`, `text 4.2.3`."""
     title: str
-    """What it shows."""
+    """Its content."""
     domain: Literal["", "simulation", "hardware"] = ""
-    """Where the document has it from; for reader and headline, not matched."""
+    """Its origin in the document; for reader and headline, not matched."""
     rows: Names | None = None
-    """What row names are values of."""
+    """Condition of the row names."""
     columns: Names | None = None
-    """What column names are values of."""
+    """Condition of the column names."""
     row: dict[str, Part] = {}
-    """Rows that say more than their name does."""
+    """Rows with more data than their name."""
     column: dict[str, Part] = {}
-    """Columns that say more than their name does, in printed order."""
+    """Columns with more data than their name, in printed order."""
     cells: dict[str, tuple[float | None, ...]] = Field(min_length=1)
     """The printed numbers: row name to one number per column; `""` for an empty cell."""
     mark: tuple[MarkOptions, ...] = ()
@@ -148,13 +148,13 @@ class PublishedOptions(Options):
     """A file of published values."""
 
     source: str
-    """The document they are from: its title."""
+    """Title of the document."""
     author: str = ""
-    """Who wrote it."""
+    """Author."""
     institution: str = ""
-    """Where."""
+    """Institution."""
     year: int | None = None
-    """When."""
+    """Year."""
     table: tuple[TableOptions, ...] = ()
     """Its tables."""
 
