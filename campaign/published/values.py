@@ -68,8 +68,8 @@ class MarkOptions(Options):
     status: Mark | None = None
     """`inconsistent`: the document contradicts itself; or `not reproducible`."""
     repeats: tuple[str, ...] = ()
-    """Tables, rows or cells with the same condition, or from which these cells follow: the status
-    fitted or seen applies here too."""
+    """Tables, rows or cells with the same condition, or from which these cells follow. If they are
+    fitted or seen, so are these cells."""
     reason: str = Field(min_length=1)
     """Reason, or remark."""
 
