@@ -41,8 +41,8 @@ class Part(Options):
     unit: str | None = None
     """Unit of the printed number; absent for a number without unit."""
     relation: Relation | None = None
-    """Claim of the document: this value (default), near it, at most or at least it, a rank in an
-    order, or a mark on a scale."""
+    """Claim of the document: this value (default), near it, at most or at least it. Or: a rank in
+    an order, or a mark on a scale."""
     decimals: int | None = Field(default=None, ge=0, le=12)
     """Printed digits after the point."""
     conditions: dict[str, str | int | float | bool] = {}
