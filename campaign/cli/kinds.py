@@ -29,14 +29,14 @@ from campaign.report.formats import formats
 from campaign.unit_grammar import listed
 from campaign.units import convert
 
-CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
+CHANNELS = ("recording", "channels", "channels of analyses, with unit and meaning")
 MODEL = "model of identify"
-UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
+UNITS_KIND = ("values", "units", "units of values, with their prefixes")
 MANY = 20
 """Least options of a table that is listed once only."""
 MOST = 60
 """Most options of a kind that a terminal shows at once."""
-BENCH = ("bench", "bench", "what a bench file may contain", Bench)
+BENCH = ("bench", "bench", "contents of a bench file", Bench)
 
 
 def list_kinds() -> None:
@@ -50,7 +50,7 @@ def list_kinds() -> None:
             else:
                 rows.append((room.room, name, f"{kind.summary}{_whose(room, name)}"))
     rows += [(MODEL, name, kind.model.summary) for name, kind in experiments_by_model().items()]
-    print_table(("room", "name", "what it is"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
+    print_table(("room", "name", "description"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
     for problem in (*problems, *stray_entries()):
         print_note(problem, style="yellow")
 
@@ -87,8 +87,8 @@ def show_kind(name: str) -> None:
             if kind.fit is not None:
                 print_line()
                 print_line(
-                    "Values that a test does not write follow from its bench where a default does "
-                    "not suit it: `campaign plan` shows them, and why."
+                    "If a default does not suit the bench, an omitted value follows from the "
+                    "bench: `campaign plan` shows the value and the reason."
                 )
             _show_needs(kind)
             if kind.model.name == name and kind.model.options is not kind.options:
@@ -115,7 +115,7 @@ def _show(
             infos = [i for i in infos if i.name == within or i.name.startswith(f"{within}.")]
         elif len(infos) > MOST and console().is_terminal:
             print_line(
-                f"{len(infos)} options; `campaign kinds {name}.TABLE` shows those of a table."
+                f"{len(infos)} options; `campaign kinds {name}.TABLE` shows the options of a table."
             )
             infos = [info for info in infos if "." not in info.name]
         rows = [_row(info) for info in infos]
@@ -156,11 +156,11 @@ def _show_needs(experiment: Experiment) -> None:
     rows += [(name, "optional", f"without it: no {what}") for name, what in optional]
     if rows:
         print_line()
-        print_table(("channel", "", "what it is for"), rows)
+        print_table(("channel", "", "purpose"), rows)
     stages = [(f"{n}, {stage.name}", stage.why) for n, stage in enumerate(experiment.stages, FIRST)]
     if stages:
         print_line()
-        print_table(("stage", "why it may follow"), stages)
+        print_table(("stage", "reason"), stages)
 
 
 def _show_channels() -> None:
