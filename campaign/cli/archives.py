@@ -95,7 +95,7 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
     if as_json:
         print_json([_tree(run) for run in shown])
     elif not runs:
-        print_note(f"{results}: no runs; `campaign run` makes one")
+        print_note(f"{results}: there are no runs; `campaign run` makes one")
     elif not shown:
         print_note(f"{results}: none of {len(runs)} runs matches")
     else:
