@@ -20,16 +20,16 @@ from campaign.units import Time
 
 
 class Response(Options):
-    """Response to an incomplete trial; a bare word is short for `{do = word}`."""
+    """Response to a trial that does not complete; a bare word is short for `{do = word}`."""
 
     do: Literal["retry", "skip", "abort"] = "skip"
-    """Execute the trial again, continue with the next one, or end the run."""
+    """Repeat the trial, continue with the next one, or end the run."""
     times: int = Field(default=1, ge=1, le=1000)
     """Largest number of retries of a trial."""
     pause: Time = Field(default=0.0, ge=0)
-    """Pause before a retry; a simulated bench does not wait."""
+    """Pause before a retry; a simulated bench has no pause."""
     then: Literal["skip", "abort"] = "skip"
-    """Response if the last retry fails too."""
+    """Response after the last retry has failed."""
 
     @model_validator(mode="before")
     @classmethod
@@ -49,7 +49,7 @@ class Rest(Options):
     every: Time = Field(gt=0)
     """Bench time between two pauses; a pause never interrupts a trial."""
     pause: Time = Field(gt=0)
-    """Duration of each; a simulated bench does not wait."""
+    """Length of a pause; a simulated bench has no pause."""
 
 
 Occasion = Literal[
@@ -67,7 +67,7 @@ NotKept = Callable[[Ending], str]
 
 
 class Policy(Options):
-    """Policy of a protocol; no motion follows a safe state that was not confirmed."""
+    """Policy of a protocol. After a safe state that is not confirmed, nothing moves."""
 
     faults: dict[Occasion, Response] = {}
     rest: Rest | None = None

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class Zero(Options):
-    """Nothing is commanded."""
+    """No command."""
 
     shape: Literal["zero"] = "zero"
 
@@ -43,7 +43,7 @@ class Sine(Options):
 
 
 class Polyline(Options):
-    """Straight lines between points; the first and last value hold outside them.
+    """Straight lines between points; the first and the last value apply outside them.
 
     A trapezoidal rate profile, a torque ramp and a measured series are all polylines.
     """
@@ -78,9 +78,9 @@ class Polyline(Options):
 
 
 class MultiSine(Options):
-    """The sum of amplitude * sin(2 pi frequency t + phase): an irregular motion, fully spelled out.
+    """Sum of amplitude * sin(2 pi frequency t + phase): a completely defined irregular motion.
 
-    Ship motion is one, with as many components as its spectrum was cut into.
+    Ship motion is one, with one component for each part of its spectrum.
     """
 
     shape: Literal["multisine"] = "multisine"

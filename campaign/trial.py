@@ -65,7 +65,7 @@ __all__ = [
 # Older plug-ins import the recording classes from here.
 
 Tree = dict[str, JsonValue]
-"""A normalised, JSON-like description: SI numbers, text, booleans, lists and tables."""
+"""A normalized, JSON-like description: SI numbers, text, booleans, lists and tables."""
 
 
 class Role(StrEnum):
@@ -78,27 +78,27 @@ class Role(StrEnum):
 
 
 class Task(Options):
-    """What the bench does during a trial, in SI: no names, no sweep, nothing to look up.
+    """Motion of the bench during a trial, in SI: complete, without references or sweep.
 
     Attributes:
         mode: `rate` closes the velocity loop on `command` (rad/s); `torque` opens it and commands
-            `command` (N m at the load) through the current loop. Two modes exist only where a bench
-            is simulated: `prescribed` moves the load relative to the hull exactly at `command`
-            (rad/s), with no motor; `spring` pulls it through a spring whose far end stands at the
-            angle `command` (rad), with no motor. `recorded` was executed by another
-            controller: only its recording is known.
-        spring_stiffness: stiffness of mode `spring` (N m/rad).
-        disturbance: external torque on the load (N m); only where a bench is simulated.
-        command: the commanded rate or torque over the trial's own time.
-        base_acceleration: angular acceleration of the hull (rad/s^2); its rate has zero mean when
-            it is a sine, and starts from rest otherwise.
-        compensation: name of a compensation method that the bench has parameters for, or `none`.
+            `command` (N m at the load) through the current loop. Two modes exist only on simulated
+            benches, without motor: `prescribed` moves the load relative to the hull exactly at
+            `command` (rad/s); `spring` pulls it through a spring whose far end has the angle
+            `command` (rad). `recorded` was executed by another program; only its recording is
+            known.
+        spring_stiffness: of mode `spring` (N m/rad).
+        disturbance: external torque on the load (N m); only on a simulated bench.
+        command: commanded rate or torque over the time of the trial.
+        base_acceleration: angular acceleration of the hull (rad/s^2); the rate has zero mean for
+            a sine, and starts from rest otherwise.
+        compensation: name of a compensation method with parameters in the bench, or `none`.
         duration: length of the trial (s).
-        window: the part of it that an analysis uses (start, stop) (s). An experiment that measures
+        window: part of the trial that an analysis uses (start, stop) (s). An experiment with
             several windows in one trial spans them here and derives them from its options.
-        stop_rate: the trial is complete as soon as the relative rate passes this (rad/s); absent:
-            it lasts its whole duration.
-        sample_rate: rate of the recording (Hz).
+        stop_rate: relative rate (rad/s) above which the trial is complete; absent: the trial lasts
+            its whole duration.
+        sample_rate: of the recording (Hz).
         start_angle: angle of the load relative to the hull at the start of the trial (rad).
     """
 
@@ -116,31 +116,31 @@ class Task(Options):
 
 
 class Trial(Options):
-    """One atomic, fully resolved unit of execution; a backend needs nothing else.
+    """One atomic, fully resolved trial; a backend needs nothing else.
 
     Attributes:
         number: place in the plan, from 1.
-        test, kind: the protocol's test it belongs to, and the experiment of that test.
-        point: the swept values that lead to it, dotted path to value, for display and analysis.
-        told: a value of `point` that has a unit, as text in the unit of the protocol.
-        options: the test's normalised options at this point (SI).
+        test, kind: its test in the protocol, and the experiment of this test.
+        point: its swept values, dotted path to value, for display and analysis.
+        told: text of each value of `point` with a unit, in the unit of the protocol.
+        options: normalized options of the test at this point (SI).
         repeat: number of the repetition, from 1.
-        seed: seed of everything random in it.
-        bench: the normalised bench (SI) with the sweep applied.
-        task: what the bench does.
-        note: remark of the plan, e.g. which rule set the measuring window.
-        setup: operator actions at the bench for it, in order; shown and confirmed before the first
-            trial for which they differ from the last confirmed ones.
-        set_by_operator: the paths of `point` that these set, e.g. `bench.gear.preload.torque`; the
-            controller sets all other swept values.
-        requires: names of the channels that its analysis needs.
-        can_use: names of those without which it only omits a part.
+        seed: of all its random numbers.
+        bench: normalized bench (SI) with the sweep applied.
+        task: motion of the bench.
+        note: remark of the plan, e.g. the rule that set the measuring window.
+        setup: manual steps that the bench needs for it, in order; shown and confirmed before the
+            first trial whose steps differ from those confirmed last.
+        set_by_operator: paths of `point` that these steps set, e.g. `bench.gear.preload.torque`;
+            the controller sets all other swept values.
+        requires: names of the channels without which its analysis has no result.
+        can_use: names of the channels without which it has fewer results.
         windows: parts that its analysis uses, by name; it derives no times from the options.
-        truth: SHA-256 of the bench that is simulated in place of `bench`, hidden from plan and
-            analysis; empty: it is `bench` itself. See `physics.truth`.
-        recording: source of the samples of a trial executed elsewhere: files with their SHA-256,
-            rows, columns and conversions; see `campaign.importing.description`.
-            Empty for a trial that a backend executes.
+        truth: SHA-256 of the bench that is simulated in place of `bench`; plan and analysis do not
+            receive it. Empty: `bench` itself. See `physics.truth`.
+        recording: source of the samples of an imported trial: files with their SHA-256, rows,
+            columns and derived channels; see `campaign.importing.description`. Empty for a trial
+            that a backend executes.
     """
 
     number: int = Field(ge=1)

@@ -166,7 +166,7 @@ def test_a_long_word_among_many_is_whole(monkeypatch: pytest.MonkeyPatch, width:
         "305 %",
         "Steps like the Stribeck velocity: raise controller.relative_rate_filter, or take another.",
     )
-    print_table(("what against what", "share", "what to do"), [row])
+    print_table(("value against limit", "share", "what to do"), [row])
     assert {*" ".join(row).split()} <= {*shown.getvalue().split()}
     assert max(map(len, shown.getvalue().splitlines())) <= width
 
@@ -186,7 +186,7 @@ def test_an_uncertainty_is_in_one_line_with_its_number(
 @pytest.mark.parametrize("width", [20, 60])
 def test_a_command_to_be_typed_is_in_one_line(monkeypatch: pytest.MonkeyPatch, width: int) -> None:
     shown = on_a_terminal(monkeypatch, width)
-    print_line(f"interrupted: 17 trials are done; to go on:\n{typed('resume', RUN, '--yes')}")
+    print_line(f"interrupted: 17 trials are done; to continue:\n{typed('resume', RUN, '--yes')}")
     assert shown.getvalue().splitlines()[-1] == f"  campaign resume {RUN} --yes"
 
 

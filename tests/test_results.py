@@ -177,7 +177,7 @@ def test_something_else_in_its_place_is_left_alone_and_said(run, capsys):
     assert path.read_text() == "mine"
     assert (run.with_name(f"{run.stem}-report") / "report.html").is_file()
     said = " ".join(capsys.readouterr().err.split())
-    assert said.count("no file of results: ") == 1
+    assert said.count("no results file: ") == 1
     assert f"{path} is there already, holds no results of campaign and stays" in said
     assert f"; {path}" not in said  # among what was written
 
@@ -279,10 +279,10 @@ def test_a_report_of_a_damaged_run_keeps_what_was_found_when_it_was_whole(run, t
     content[place + 20] ^= 1
     run.write_bytes(content)
     report(run, tmp_path / "report", ExitCode.ARCHIVE)
-    assert "kept as it is" in " ".join(capsys.readouterr().err.split())
+    assert "not changed: it was made" in " ".join(capsys.readouterr().err.split())
     assert results_path(run).read_bytes() == before
     report(alone(run), tmp_path / "report", ExitCode.ARCHIVE)
-    assert "kept as it is" not in " ".join(capsys.readouterr().err.split())
+    assert "not changed: it was made" not in " ".join(capsys.readouterr().err.split())
     assert read_results(results_path(run), open_run(run).identity).damaged
 
 
@@ -399,7 +399,7 @@ def test_results_are_no_run_to_any_command(run):
     assert len(every) == 2
     verified = command("verify", *every)  # as a shell makes it from *.nxs
     assert verified.returncode == ExitCode.DONE, verified.stdout
-    assert f"{results_path(run)}: sound (holds results of a run, and no run)" in verified.stdout
+    assert f"{results_path(run)}: sound (results of a run, not a run)" in verified.stdout
     assert json.loads(command("verify", "--json", *every).stdout)[0]["sound"]
     with pytest.raises(ArchiveError, match="holds no run but what was found in one"):
         campaign.open(results_path(run))

@@ -112,7 +112,7 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
     no_pager: Annotated[
-        bool, flag("--no-pager", "Show long output as it comes, not by PAGER (less).")
+        bool, flag("--no-pager", "Print long output without PAGER (less).")
     ] = False,
 ) -> None:
     pass
@@ -135,7 +135,7 @@ def plan(
     allow_large: given.Large = False,
     truth: given.Truth = "",
 ) -> Ended:
-    """Show the trials, their time and limits, and what would be written; execute nothing."""
+    """Show the trials, their time, limits and output files; execute nothing."""
     from campaign.cli.plan import show_plan
     from campaign.cli.prepare import Request, short_settings
 
@@ -158,9 +158,9 @@ def run(
     port: given.Port = None,
     source: given.From = None,
     handover: given.Handover = None,
-    operator: Annotated[str, option("--operator", "NAME", "Who is responsible for the run.")] = "",
-    note: Annotated[str, option("--note", "TEXT", "Anything worth keeping with the run.")] = "",
-    tags: Annotated[list[str] | None, several("--tag", "WORD", "To find the run by")] = None,
+    operator: Annotated[str, option("--operator", "NAME", "Person responsible for the run.")] = "",
+    note: Annotated[str, option("--note", "TEXT", "Remark to archive with the run.")] = "",
+    tags: Annotated[list[str] | None, several("--tag", "WORD", "For `list --tag`")] = None,
     yes: given.Yes = False,
     clear_stop: given.ClearStop = None,
     sign: given.Sign = None,
@@ -170,10 +170,10 @@ def run(
         bool,
         flag(
             "--check-step",
-            "Simulate each trial once more at half its step, and say what that changes.",
+            "Simulate each trial again at half its step, and print the largest change.",
         ),
     ] = False,
-    profile: Annotated[bool, flag("--profile", "Say at the end where the time went.")] = False,
+    profile: Annotated[bool, flag("--profile", "Print the time by kind of work.")] = False,
     watch: given.Watch = False,
 ) -> Ended:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
@@ -211,7 +211,7 @@ def resume(
         bool,
         flag(
             "--accept-changes",
-            "Go on although protocol, bench, backend or versions have changed since.",
+            "Continue although protocol, bench, backend or versions have changed.",
         ),
     ] = False,
     workers: given.Workers = None,
@@ -224,7 +224,7 @@ def resume(
     sign: given.Sign = None,
     watch: given.Watch = False,
 ) -> Ended:
-    """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
+    """Continue a run that was interrupted, killed or ended by a fault; skip finished trials."""
     from campaign.cli.cluster import ExecutorChoice
     from campaign.cli.resume import resume_run
 
@@ -246,10 +246,10 @@ def resume(
 @command()
 def rerun(
     run: given.Run,
-    trial: Annotated[str, typer.Argument(metavar="TRIAL", help="Its number, or its name.")],
+    trial: Annotated[str, typer.Argument(metavar="TRIAL", help="Number or name of the trial.")],
     results: given.Results = RESULTS,
 ) -> Ended:
-    """Execute one archived trial again on the simulated bench, and compare it bit by bit."""
+    """Simulate one archived trial again, and compare it bit by bit."""
     from campaign.cli.rerun import rerun_trial
 
     return rerun_trial(run, trial, results)
@@ -261,8 +261,8 @@ def import_(
         list[str],
         given.argument(
             "MAPPING",
-            "A TOML file that says what columns are and which files are which trials; with "
-            "--guess the recordings themselves.",
+            "A TOML file that assigns columns to channels and files to trials; with --guess, the "
+            "recordings.",
         ),
     ],
     results: given.Results = RESULTS,
@@ -271,11 +271,11 @@ def import_(
     workers: given.Workers = None,
     report: given.Report = False,
     guess: Annotated[
-        bool, flag("--guess", "Print a first mapping of these files, to be corrected.")
+        bool, flag("--guess", "Print a first mapping of these files, for correction.")
     ] = False,
     sign: given.Sign = None,
 ) -> Ended:
-    """Make a run of recordings from elsewhere; the archive's path is the last line of the output.
+    """Import recordings as a run; the archive's path is the last line of the output.
 
     A mapping is a protocol whose tests were executed by another program: docs/import.md.
     """
@@ -303,22 +303,22 @@ def calibrate(
         option(
             "--output",
             "FILE",
-            "Where the result goes, with the bench beside it; a new file in --results when absent.",
+            "Result file, with the bench beside it; default: a new file in --results.",
         ),
     ] = None,
-    workers: Annotated[int | None, given.workers_option("Simulations at once")] = None,
+    workers: Annotated[int | None, given.workers_option("Parallel simulations")] = None,
     leave_out: Annotated[
         bool,
         flag(
             "--leave-one-out/--no-leave-one-out",
-            "Refit without each frequency in turn, to see how well it is predicted.",
+            "Fit again without each frequency in turn, to test its prediction.",
         ),
     ] = True,
     fit: Annotated[
         bool,
         flag(
             "--fit/--no-fit",
-            "Without: the bench stays as it is, and intervals and covariance are worked out.",
+            "--no-fit: keep the bench, and compute intervals and covariance only.",
         ),
     ] = True,
     propagate: Annotated[
@@ -326,7 +326,7 @@ def calibrate(
         option(
             "--propagate",
             "PROTOCOL",
-            "Carry the covariance to the published cells of this protocol, not of its own.",
+            "Propagate the covariance to the published cells of this other protocol.",
         ),
     ] = "",
 ) -> Ended:

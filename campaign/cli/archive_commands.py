@@ -19,7 +19,7 @@ def report(
     results: given.Results = RESULTS,
     output: Annotated[
         Path | None,
-        option("--output", "DIR", "Where to write it; RUN-report beside the archive when absent."),
+        option("--output", "DIR", "Output folder; default: RUN-report beside the archive."),
     ] = None,
     templates: given.Templates = None,
     open_it: given.Open = False,
@@ -27,7 +27,7 @@ def report(
         bool,
         flag(
             "--measure-anew",
-            "Measure the recordings by this program, not as they were when executed.",
+            "Compute the metrics of the recordings again, with this version.",
         ),
     ] = False,
     only_figure: Annotated[
@@ -35,8 +35,8 @@ def report(
         option(
             "--only-figure",
             "TEST/KEY",
-            "Only this figure, or all, SVG and CSV; into RUN-figures, or --output. Its "
-            "caption on the page names it.",
+            "Write only this figure, or all, as SVG and CSV into RUN-figures or --output. "
+            "Captions on the page state TEST/KEY.",
         ),
     ] = None,
     column: Annotated[
@@ -44,7 +44,7 @@ def report(
         option(
             "--column",
             "single|double",
-            "With --only-figure: 88 or 180 mm wide, with PDF, for a paper.",
+            "With --only-figure: 88 or 180 mm wide, also as PDF, for a paper.",
         ),
     ] = "",
     formats: given.Format = None,
@@ -53,11 +53,11 @@ def report(
         option(
             "--trials",
             "WHICH",
-            "Trials that get a page of their own: failed, all, N..M, or N,M.",
+            "Trials with their own page: failed, all, N..M, or N,M.",
         ),
     ] = "",
     zoom: Annotated[
-        bool, flag("--interactive", "Lines of the page can be zoomed into and read off.")
+        bool, flag("--interactive", "Add zoom and cursor values to lines of the page.")
     ] = False,
     references: Annotated[
         list[Path] | None,
@@ -68,7 +68,7 @@ def report(
         ),
     ] = None,
 ) -> Ended:
-    """Write report.html, its tables and its figures, from an archive alone."""
+    """Write report.html, its tables and its figures from an archive."""
     from campaign.cli.report import draw_figures, report_run
 
     if only_figure is None:
@@ -112,28 +112,27 @@ def compare(
         list[str],
         argument(
             "RUN RUN...",
-            "The reference, and what is compared with it: paths, names, or their beginnings.",
+            "The reference, then the runs to compare: paths, names, or their beginnings.",
         ),
     ],
     results: given.Results = RESULTS,
     output: Annotated[
         Path | None,
-        option("--output", "DIR", "Where to write it; beside the reference when absent."),
+        option("--output", "DIR", "Output folder; default: beside the reference."),
     ] = None,
     exchanged: Annotated[
         list[str] | None,
         several(
             "--exchanged",
             "SOURCE",
-            "What differs although the benches state one value, such as `torque constant` of "
-            "another motor",
+            "Difference that the benches do not state, such as `torque constant` of another motor",
         ),
     ] = None,
     templates: given.Templates = None,
     formats: given.Format = None,
     open_it: given.Open = False,
 ) -> Ended:
-    """Say which numbers of runs differ from those of the first, and how sure that is."""
+    """List the numbers of runs that differ from those of the first, with significance."""
     from campaign.cli.compare import compare_archives
 
     return compare_archives(
@@ -147,7 +146,7 @@ def identify(
         str | None,
         argument(
             "[RUN[:TEST]]",
-            "A run, or one test of it: path, name, or its beginning; the newest when absent.",
+            "A run, or one test of it: path, name, or its beginning; default: the newest run.",
         ),
     ] = None,
     results: given.Results = RESULTS,
@@ -157,26 +156,30 @@ def identify(
     ] = None,
     validate: Annotated[
         str | None,
-        option("--validate", "RUN[:TEST]", "Predict this one, to which nothing is fitted."),
+        option(
+            "--validate",
+            "RUN[:TEST]",
+            "Validate with this run; it is not fitted.",
+        ),
     ] = None,
     compare_with: Annotated[
         str | None,
         option(
             "--compare",
             "RUN[:TEST]",
-            "Fit the same model to this one, and say what has changed.",
+            "Fit the same model to this run, and list the changes.",
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        option("--output", "BENCH.toml", "Write the rig's bench file with what was identified."),
+        option("--output", "BENCH.toml", "Write the rig's bench file with the identified values."),
     ] = None,
     page: Annotated[
         Path | None,
         option(
             "--page",
             "DIR",
-            "Where the page goes; RUN-identification beside the archive when absent.",
+            "Folder of the page; default: RUN-identification beside the archive.",
         ),
     ] = None,
     changes: given.Set = None,
@@ -184,7 +187,7 @@ def identify(
     formats: given.Format = None,
     open_it: given.Open = False,
 ) -> Ended:
-    """Identify a rig from its recordings: parameters, intervals, and what they rest on."""
+    """Identify parameters of a rig from its recordings, with intervals and evidence."""
     from campaign.cli.identify import identify_run
 
     return identify_run(
@@ -208,7 +211,7 @@ def trend(
         list[str],
         argument(
             "RUN RUN RUN...",
-            "Three runs of one rig or more, in any order: paths, names, or their beginnings.",
+            "At least three runs of one rig, in any order: paths, names, or their beginnings.",
         ),
     ],
     results: given.Results = RESULTS,
@@ -217,8 +220,8 @@ def trend(
         option(
             "--over",
             "WHAT",
-            "Over what: time, order, temperature (a channel, or a tag temperature=23.5), "
-            "a tag NAME=NUMBER, or a number that the runs found.",
+            "Covariate: time, order, temperature (a channel, or a tag temperature=23.5), "
+            "a tag NAME=NUMBER, or a result of the runs.",
         ),
     ] = "time",
     model: Annotated[
@@ -226,7 +229,7 @@ def trend(
         several(
             "--model",
             "NAME",
-            "Follow what this method identifies, too (`campaign kinds` lists them)",
+            "Include the parameters of this method (`campaign kinds` lists them)",
         ),
     ] = None,
     exchanged: Annotated[
@@ -234,19 +237,18 @@ def trend(
         several(
             "--exchanged",
             "SOURCE@RUN",
-            "What another piece has from this run on, such as the `torque constant` of an "
-            "exchanged motor",
+            "Difference from this run on, such as the `torque constant` of an exchanged motor",
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        option("--output", "DIR", "Where to write it; beside the last run when absent."),
+        option("--output", "DIR", "Output folder; default: beside the last run."),
     ] = None,
     templates: given.Templates = None,
     formats: given.Format = None,
     open_it: given.Open = False,
 ) -> Ended:
-    """Say which numbers of a rig drift or jump over its runs, or follow the temperature."""
+    """List the numbers of a rig that drift, jump, or follow the temperature over its runs."""
     from campaign.cli.trend import trend_of_archives
 
     return trend_of_archives(
@@ -264,7 +266,7 @@ def trend(
 
 @command()
 def index(
-    results: Annotated[Path | None, argument("[RESULTS]", "As --results.")] = None,
+    results: Annotated[Path | None, argument("[RESULTS]", "Same as --results.")] = None,
     folder: given.Results = RESULTS,
     open_it: given.Open = False,
 ) -> Ended:
@@ -282,16 +284,16 @@ def index(
 @command()
 def export(
     run: given.Run,
-    to: Annotated[str, option("--to", "FORMAT", "csv, parquet, mat, or a plug-in's.")],
+    to: Annotated[str, option("--to", "FORMAT", "csv, parquet, mat, or of a plug-in.")],
     results: given.Results = RESULTS,
     output: Annotated[
         Path | None,
-        option("--output", "DIR", "A new folder; RUN-FORMAT beside the archive when absent."),
+        option("--output", "DIR", "A new folder; default: RUN-FORMAT beside the archive."),
     ] = None,
     tests: Annotated[list[str] | None, several("--test", "TEST", "Only this test")] = None,
     trials: Annotated[list[int] | None, several("--trial", "N", "Only this trial")] = None,
 ) -> Ended:
-    """Write recordings as files of other programs, with a table of the trials beside them."""
+    """Write recordings as files of other programs, with a table of the trials."""
     from campaign.cli.export import export_archive
 
     return export_archive(run, results, to, output, tests or (), trials or ())
@@ -301,18 +303,21 @@ def export(
 def list_command(
     results: given.Results = RESULTS,
     protocol: Annotated[
-        list[str] | None, option("--protocol", "NAME", "Runs of it; a pattern will do.")
+        list[str] | None,
+        option("--protocol", "NAME", "Protocol: a name or a pattern."),
     ] = None,
-    since: Annotated[str, option("--since", "DATE", "Begun then or later.")] = "",
-    until: Annotated[str, option("--until", "DATE", "Begun by then.")] = "",
-    backend: Annotated[list[str] | None, option("--backend", "NAME", "Executed by it.")] = None,
+    since: Annotated[str, option("--since", "DATE", "Earliest start.")] = "",
+    until: Annotated[str, option("--until", "DATE", "Latest start.")] = "",
+    backend: Annotated[list[str] | None, option("--backend", "NAME", "Backend of the run.")] = None,
     bench: Annotated[
-        list[str] | None, option("--bench", "NAME", "With a test on it; a pattern will do.")
+        list[str] | None,
+        option("--bench", "NAME", "Bench of a test: a name or a pattern."),
     ] = None,
     status: Annotated[
-        list[str] | None, option("--status", "STATUS", "As `complete` or `failed trials`.")
+        list[str] | None,
+        option("--status", "STATUS", "Status, e.g. `complete` or `failed trials`."),
     ] = None,
-    tag: Annotated[list[str] | None, option("--tag", "TAG", "With every tag given.")] = None,
+    tag: Annotated[list[str] | None, option("--tag", "TAG", "With all given tags.")] = None,
     as_json: given.Json = False,
 ) -> None:
     """List the archived runs, the newest first; options but --since and --until may be repeated."""
@@ -335,11 +340,11 @@ def show(
     run: given.NewestRun = None,
     results: given.Results = RESULTS,
     metrics: Annotated[
-        bool, flag("--metrics", "Also the metrics of each recording, with intervals.")
+        bool, flag("--metrics", "Also show the metrics of each recording, with intervals.")
     ] = False,
     as_json: given.Json = False,
 ) -> Ended:
-    """Show what a run was, how it ended, and all that did not go as planned."""
+    """Show description and ending of a run, and all deviations from the plan."""
     from campaign.cli.show import show_archive
 
     return show_archive(run, results, as_json=as_json, metrics=metrics)
@@ -357,17 +362,17 @@ def verify(
     results: given.Results = RESULTS,
     signer: Annotated[
         str | None,
-        option("--signer", "NAME", "Who must have signed; needs --allowed-signers."),
+        option("--signer", "NAME", "Required signer; needs --allowed-signers."),
     ] = None,
     allowed_signers: Annotated[
         Path | None,
-        option("--allowed-signers", "FILE", "Which keys are whose, as ssh-keygen(1) describes it."),
+        option("--allowed-signers", "FILE", "Keys of signers, in the format of ssh-keygen(1)."),
     ] = None,
     as_json: given.Json = False,
 ) -> Ended:
     """Check every byte of archives against checksums, journal, format and fingerprints.
 
-    Anyone who changes a run can compute its checksums anew: only a signature shows that.
+    Checksums do not show a change on purpose, as they can be recomputed; a signature does.
     """
     from campaign.cli.verify import verify_archives, wanted_signature
 
@@ -383,13 +388,13 @@ def sign(
         option(
             "--key",
             "FILE",
-            "A private key of OpenSSH, or a public one whose other half the agent has.",
+            "A private OpenSSH key, or a public one with the private key in the agent.",
         ),
     ],
     results: given.Results = RESULTS,
-    replace: Annotated[bool, flag("--replace", "Set a signature that is there aside.")] = False,
+    replace: Annotated[bool, flag("--replace", "Rename an existing signature.")] = False,
 ) -> Ended:
-    """Sign a sealed run that is sound: a file RUN.nxs.sig beside it proves who, not when."""
+    """Sign a sealed, sound run: a file RUN.nxs.sig beside it proves who signed, not when."""
     from campaign.cli.sign import sign_archive
 
     return sign_archive(run, results, key, replace=replace)

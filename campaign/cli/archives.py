@@ -72,7 +72,7 @@ def _time(option: str, text: str, *, at_end: bool) -> datetime | None:
         moment = datetime.fromisoformat(text)
     except ValueError:
         raise UsageError(
-            f"{option} {text!r}: is no date; write 2026-11-21 or 2026-11-21T09:30"
+            f"{option} {text!r}: is not a date; write 2026-11-21 or 2026-11-21T09:30"
         ) from None
     moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
     whole_day = len(text) <= len("2026-11-21")
@@ -97,7 +97,7 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
     elif not runs:
         print_note(f"{results}: there are no runs; `campaign run` makes one")
     elif not shown:
-        print_note(f"{results}: none of {len(runs)} runs is like that")
+        print_note(f"{results}: none of {len(runs)} runs matches")
     else:
         print_table(_HEADINGS, [_row(run) for run in shown], spare=_SPARE)
     for path, what in find_remnants(results).items():

@@ -51,26 +51,26 @@ def allow_motion(
         return
     if not yes and not has_terminal():
         raise UsageError(
-            f"the backend {kind.name!r} moves a real bench, and there is no terminal to ask "
-            "whether it may; --yes says so"
+            f"the backend {kind.name!r} moves a real bench, and there is no terminal for the "
+            "prompt; --yes permits the motion"
         )
     names = {trial.test for trial in trials}
     unstable = list(sought_instability([test for test in tests if test.name in names]))
     for line in unstable:
         print_note(line, "yellow")
     if unstable and not yes:
-        _must_agree("It will shake, or run into a limit. Type yes if it may: ")
+        _must_agree("The bench will shake or reach a limit. Type yes to permit this: ")
     for line in motion_summary(kind.name, trials, tests):
         print_note(line)
     if not yes:
-        _must_agree("Is the bench clear, and may it move? Type yes to begin: ")
+        _must_agree("Is the bench clear for motion? Type yes to begin: ")
 
 
 def say_by_hand(options: Options) -> None:
     """Print the page with instructions for the operator, if the backend hands trials out."""
     folder = getattr(options, "folder", "")
     if folder:
-        print_note(f"for the person at the rig: {Path(folder) / 'index.html'}")
+        print_note(f"instructions for the operator: {Path(folder) / 'index.html'}")
 
 
 def _must_agree(question: str) -> None:
@@ -94,7 +94,7 @@ def motion_summary(
         if test.stages and test.name in {trial.test for trial in trials}:
             most = most_of(test.stages)
             after = f"at most {most.trials} more trials, {clock(most.duration)}, may follow"
-            lines.append(f"  {test.name}: {after} from what it finds")
+            lines.append(f"  {test.name}: {after} from its results")
     steps = dict.fromkeys(step for trial in trials for step in trial.setup)
     return [*lines, *(f"  you will be asked to: {step}" for step in steps)]
 
@@ -140,7 +140,7 @@ class ConsoleOperator:
         with self._hidden():
             print_note(f"before {trial.name} ({trial.label}):\n  {step}", "bold")
             while True:
-                print_note("Enter when it is done, or stop to end the run: ")
+                print_note("Press Enter after this step, or type stop to end the run: ")
                 line = read_line(stop)
                 if line is None or line.strip().lower() == "stop":
                     return None

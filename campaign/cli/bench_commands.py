@@ -21,7 +21,7 @@ __all__ = ["app"]
 def kinds(
     name: Annotated[
         str | None,
-        argument("[NAME]", "One of them, with its options.", autocompletion=complete_kind),
+        argument("[NAME]", "Show the options of this one.", autocompletion=complete_kind),
     ] = None,
 ) -> None:
     """List experiments, friction models, compensation methods and backends."""
@@ -43,11 +43,16 @@ def model(
     frequency: Annotated[str, option("--frequency", "FREQUENCY", "Of the rate.")] = "1 Hz",
     changes: Annotated[list[str] | None, several("--set", "PARAMETER=VALUE", "A parameter")] = None,
     bench: Annotated[
-        str, option("--bench", "BENCH", "Its first friction interface gives the others.")
+        str,
+        option(
+            "--bench",
+            "BENCH",
+            "Other parameters: from its first friction interface.",
+        ),
     ] = "simulink",
-    output: Annotated[Path | None, option("--output", "FILE.svg", "Where to draw.")] = None,
+    output: Annotated[Path | None, option("--output", "FILE.svg", "File of the picture.")] = None,
 ) -> Ended:
-    """Draw friction models alone, at a sinusoidal rate; CSV beside the picture."""
+    """Draw friction models at a sinusoidal rate, with a CSV file beside the picture."""
     from campaign.cli.model import show_models
 
     motion = {"rate": rate, "frequency": frequency}
@@ -58,10 +63,10 @@ def model(
 def schema(
     of: Annotated[
         str,
-        typer.Argument(metavar="protocol|bench|mapping|report", help="Which files it describes."),
+        typer.Argument(metavar="protocol|bench|mapping|report", help="Kind of file."),
     ],
 ) -> None:
-    """Print a JSON Schema, by which editors complete and check TOML."""
+    """Print a JSON Schema, with which editors complete and check TOML."""
     from campaign.cli.schemas import print_schema
 
     print_schema(of)
@@ -71,12 +76,12 @@ def schema(
 def new(
     kind: Annotated[
         str,
-        typer.Argument(metavar="experiment|model|method|backend|format", help="What it provides."),
+        typer.Argument(metavar="experiment|model|method|backend|format", help="Kind to provide."),
     ],
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the package and its kind.")],
-    output: Annotated[Path, option("--output", "DIR", "Where its folder is made.")] = Path(),
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the package and its kind.")],
+    output: Annotated[Path, option("--output", "DIR", "Parent of the new folder.")] = Path(),
 ) -> None:
-    """Write a package of your own: a kind that works, with a test."""
+    """Write a new package with a working kind and its test."""
     from campaign.cli.new_package import new_package
 
     new_package(kind, name, output)
@@ -92,7 +97,7 @@ def warmup() -> Ended:
 
 @command()
 def doctor(results: given.Results = RESULTS, as_json: given.Json = False) -> Ended:
-    """Say what this installation is, what is wrong with it, and what to do."""
+    """Show this installation, its problems, and what to do."""
     from campaign.cli.doctor import examine
 
     return examine(results, as_json=as_json)
@@ -100,7 +105,7 @@ def doctor(results: given.Results = RESULTS, as_json: given.Json = False) -> End
 
 @command()
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Made when it is not there.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Created if missing.")],
     bench: Annotated[
         str,
         option(
@@ -110,10 +115,10 @@ def init(
         ),
     ] = "",
     everything: Annotated[
-        bool, flag("--all", "Beside those of a bench, copy all that is shipped, too.")
+        bool, flag("--all", "With --bench, also copy all shipped files.")
     ] = False,
 ) -> None:
-    """Copy the shipped protocols, benches and templates into DIR, or write a bench its own."""
+    """Copy the shipped protocols, benches and templates into DIR, or write some for a bench."""
     if bench:
         from campaign.cli.rig_protocols import init_for_bench
 
@@ -132,12 +137,12 @@ def check(
         option(
             "--output",
             "FILE",
-            "The Bode picture, .svg or .png; BENCH-check.svg in this folder when absent.",
+            "Bode plot, .svg or .png; default: BENCH-check.svg in this folder.",
         ),
     ] = None,
     as_json: given.Json = False,
 ) -> Ended:
-    """Show the loops of a bench, their margins, and whether its sizes fit each other."""
+    """Show the loops of a bench, their margins, and whether its values are consistent."""
     from campaign.cli.check import check_bench
 
     return check_bench(bench, output, as_json=as_json)
@@ -147,10 +152,10 @@ def check(
 def fingerprint(
     bench: given.Bench,
     check: Annotated[
-        bool, flag("--check", "Only say whether the bench is the one described.")
+        bool, flag("--check", "Only compare the bench with its stated fingerprint.")
     ] = False,
 ) -> Ended:
-    """State in a bench's file that what is known of it is said of the bench as it is now."""
+    """Write a bench's fingerprint into its file: its known values apply to this state."""
     from campaign.cli.fingerprint import fingerprint_bench
 
     return fingerprint_bench(bench, check=check)
@@ -163,7 +168,7 @@ def device(
         option(
             "--bench",
             "BENCH",
-            "The bench behind the controller: a TOML file, or a shipped bench's name.",
+            "Simulated bench: a TOML file, or a shipped bench's name.",
         ),
     ],
     pty: Annotated[bool, flag("--pty", "Serve a pseudo-terminal.")] = False,
@@ -172,25 +177,25 @@ def device(
         option(
             "--tcp",
             "HOST:PORT",
-            "Serve TCP there, port 0 for any; without --pty and --tcp 127.0.0.1:0.",
+            "Serve TCP there, port 0 for any; default without --pty: 127.0.0.1:0.",
         ),
     ] = None,
-    speed: Annotated[str, option("--speed", "X", "Times the wall clock, or max.")] = "1",
+    speed: Annotated[str, option("--speed", "X", "Factor to the wall clock, or max.")] = "1",
     faults: Annotated[
         list[str] | None,
         several(
             "--fault",
             "NAME[=VALUE][@trial=N][@time=S]",
-            "What shall go wrong, e.g. drop=1e-4 or reboot@trial=2",
+            "Fault to inject, e.g. drop=1e-4 or reboot@trial=2",
         ),
     ] = None,
-    fault_seed: Annotated[int, option("--fault-seed", "N", "Of what fails by chance.", min=0)] = 0,
+    fault_seed: Annotated[int, option("--fault-seed", "N", "Seed of random faults.", min=0)] = 0,
     heartbeat_timeout: Annotated[
         float | None,
         option(
             "--heartbeat-timeout",
             "S",
-            "Silence after which it switches off; 0.1 s, at --speed max 3 s if absent.",
+            "Silence (s) after which it switches off; default: 0.1, at --speed max 3.",
             min=0.01,
             max=60.0,
         ),
@@ -200,17 +205,17 @@ def device(
         option(
             "--latch",
             "FILE",
-            "Where it remembers that it was stopped; a new file if absent; none: nowhere.",
+            "File that stores a panic stop; default: a temporary file; none: no file.",
         ),
     ] = None,
     new_latch: Annotated[
-        bool, flag("--new-latch", "First start: make the --latch FILE, not latched.")
+        bool, flag("--new-latch", "First start: create the --latch FILE, not latched.")
     ] = False,
     log: Annotated[
-        Path | None, option("--log", "FILE", "Note drive, stops and hosts there.")
+        Path | None, option("--log", "FILE", "Log drive, stops and hosts to this file.")
     ] = None,
 ) -> Ended:
-    """Emulate a servo controller with a simulated bench; Ctrl-C ends it."""
+    """Emulate a servo controller with a simulated bench, until Ctrl-C."""
     from campaign.cli.device import run_device
 
     return run_device(
@@ -231,7 +236,7 @@ def device(
 def stop(
     port: given.Controller, baud: given.Baud = 2_000_000, patience: given.Patience = 10.0
 ) -> Ended:
-    """Panic stop: drive off, and off it stays; works whoever has the port, and while that hangs."""
+    """Panic stop: switch the drive off and latch it, even if another program holds the port."""
     from campaign.cli.stop import stop_bench
 
     return stop_bench(port, baud, patience)
@@ -244,7 +249,7 @@ def status(
     patience: given.Patience = 3.0,
     as_json: given.Json = False,
 ) -> Ended:
-    """Show how a controller is, who holds it, and whether somebody has stopped it."""
+    """Show the state of a controller, its holder, and any panic stop."""
     from campaign.cli.status import show_status
 
     return show_status(port, baud, patience, as_json=as_json)
@@ -253,11 +258,11 @@ def status(
 @command("export-compensation")
 def export_compensation_command(
     bench: given.Bench,
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the bench's [compensation].")],
-    target: Annotated[str, option("--to", "c|c-single|st|matlab|json", "In which form.")] = "c",
-    output: Annotated[Path, option("--output", "DIR", "Where to write it.")] = Path(),
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A compensation in the bench file.")],
+    target: Annotated[str, option("--to", "c|c-single|st|matlab|json", "Target language.")] = "c",
+    output: Annotated[Path, option("--output", "DIR", "Output folder.")] = Path(),
 ) -> Ended:
-    """Write a compensation of a bench as code for a controller, with test vectors."""
+    """Write a compensation of a bench as controller code, with test vectors."""
     from campaign.cli.export_compensation import export_compensation
 
     return export_compensation(bench, name, target, output), ExitCode.DONE

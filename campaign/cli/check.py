@@ -132,11 +132,11 @@ def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> N
     if not facts:
         return
     shown = [fact for fact in facts if fact.verdict != FINE] if on_a_terminal() else facts
-    headings = ("what against what", "is", "of", "share", "verdict", "what to do")
+    headings = ("value against limit", "is", "of", "share", "verdict", "what to do")
     if shown:
         print_table(headings, [_fact_row(fact) for fact in shown], spare=("of", "is", "share"))
     if fine := len(facts) - len(shown):
-        print_line(f"left out: {fine} sizes that are fine; with `| cat` all is shown")
+        print_line(f"left out: {fine} values that are fine; with `| cat` all is shown")
     print_line()
 
 

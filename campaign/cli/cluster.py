@@ -38,8 +38,8 @@ class ExecutorChoice:
             return choose_workers(kind, len(trials), workers)
         if not kind.picklable:
             raise UsageError(
-                f"--executor: a cluster executes simulated trials, and the backend {kind.name!r} "
-                "is where its bench is; leave --executor out"
+                f"--executor: a cluster executes only simulated trials, not those of the backend "
+                f"{kind.name!r}; leave --executor out"
             )
         return workers
 
@@ -56,7 +56,7 @@ class ExecutorChoice:
         with cluster(self.executor, workers, backend, trials, self.tls) as dask:
             for why in dask.refused.values():
                 print_note(why, style="yellow")
-            print_note(f"{self.executor}: {dask.threads} trials, or blocks of them, at once")
+            print_note(f"{self.executor}: {dask.threads} parallel trials or blocks of trials")
             yield dask.threads, dask.executor
 
 

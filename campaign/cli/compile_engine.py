@@ -98,14 +98,14 @@ def warm_up() -> ExitCode:
             make_all(tell, helpers)
     taken = time.monotonic() - began
     if compiled:
-        print_line(f"compiled {len(compiled)} parts in {taken:.1f} s; {kept} were there")
+        print_line(f"compiled {len(compiled)} parts in {taken:.1f} s; {kept} existed")
     else:
-        print_line(f"nothing to compile: all {kept} parts are there, loaded in {taken:.1f} s")
+        print_line(f"nothing to compile: all {kept} parts exist, loaded in {taken:.1f} s")
     where = folder()
     if where is None:
         print_note(
             distrusted()
-            or "nothing is kept: the user's cache cannot be written; NUMBA_CACHE_DIR may name "
+            or "nothing is kept: the user's cache cannot be written; set NUMBA_CACHE_DIR to "
             "another folder",
             "yellow",
         )

@@ -70,7 +70,7 @@ def _serve(
                 signal.signal(getattr(signal, name), _interrupt)
         print_line(line.name)
         print_note(f"emulating the controller of {setup.bench.name!r}; Ctrl-C ends it")
-        print_note(f"panic stops are kept in {setup.latch_file or 'no file'}")
+        print_note(f"panic stops are stored in {setup.latch_file or 'no file'}")
         server.serve()
     except KeyboardInterrupt:
         pass  # the normal end
@@ -84,7 +84,7 @@ def _latch_file(named: str | None, *, new: bool) -> Iterator[Path | None]:
     new: whether this is the first start of a controller with a named file.
     """
     if named in (None, "none") and new:
-        raise UsageError("--new-latch needs --latch FILE: the file that it makes")
+        raise UsageError("--new-latch needs --latch FILE: the file to create")
     if named == "none":
         yield None
     elif named is not None:
@@ -95,7 +95,7 @@ def _latch_file(named: str | None, *, new: bool) -> Iterator[Path | None]:
             _make(file)
         elif not os.path.lexists(file):
             print_note(
-                f"--latch {named}: no such file, so latched; --new-latch is for the first start"
+                f"--latch {named}: no such file, so latched; use --new-latch at the first start"
             )
         yield file
     else:

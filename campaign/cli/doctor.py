@@ -71,12 +71,12 @@ def _libraries() -> Iterator[Finding]:
             if extra:
                 yield Finding(label, "absent", "absent", f"pip install 'campaign[{extra}]'")
             else:
-                yield Finding(label, "absent", "wrong", "pip install campaign, anew")
+                yield Finding(label, "absent", "wrong", "install campaign again with pip")
             continue
         if asked.specifier.contains(version, prereleases=True):
             yield Finding(label, version)
         else:
-            advice = f"asked for is {asked.specifier}: pip install '{asked.name}{asked.specifier}'"
+            advice = f"required is {asked.specifier}: pip install '{asked.name}{asked.specifier}'"
             yield Finding(label, version, "wrong", advice)
 
 
@@ -98,8 +98,8 @@ def _cache() -> Iterator[Finding]:
 
     where = folder()
     if where is None:
-        advice = distrusted() or "NUMBA_CACHE_DIR names a folder that can be written"
-        yield Finding("compiled engine", "kept nowhere: each run compiles", "look", advice)
+        advice = distrusted() or "set NUMBA_CACHE_DIR to a folder that can be written"
+        yield Finding("compiled engine", "not kept: each run compiles", "look", advice)
         return
     size = bytes_text(sum(each.stat().st_size for each in where.rglob("*") if each.is_file()))
     made = all(map(is_made, WIDTHS))

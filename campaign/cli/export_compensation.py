@@ -42,7 +42,7 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
     low = [each.verdict for each in _loops(compensation.bench, name) if each.verdict != "fine"]
     if low:
         print_note(
-            f"of its loops {len(low)} are not fine: {'; '.join(dict.fromkeys(low))}", "yellow"
+            f"{len(low)} of its loops are not fine: {'; '.join(dict.fromkeys(low))}", "yellow"
         )
     return [output / file for file in texts]
 
@@ -55,14 +55,14 @@ def _head(bench: str, made: SampledCompensation) -> Iterator[str]:
     yield f"Bench file: {bench}, SHA-256 {hashlib.sha256(source.text.encode()).hexdigest()[:16]}"
     yield f"Sampled every {number(1e3 * float(made.controller.period[0]), 4)} ms; SI units."
     if (run := its.known.identified) is not None:
-        yield f"Values that are measured: from {run.run}, digest {run.digest[:16]}"
+        yield f"Measured values: from {run.run}, digest {run.digest[:16]}"
     for path, value in _leaves(its.compensation[made.name]):
         known = its.known.values.get(f"compensation.{made.name}.{path}")
         yield f"{path} = {value}" + ("" if known is None else f" ({_uncertainty(known)})")
     for each in _loops(its, made.name):
         margins = each.verdict if each.margins is None else margins_in_words(each.margins)
         yield f"Loop, {each.regime}, {each.mode} command: {margins}"
-    yield "Not in it: delays and resolutions of sensors; the rate loop."
+    yield "Not included: delays and resolutions of sensors; the rate loop."
 
 
 def _uncertainty(known: KnownValue) -> str:

@@ -24,7 +24,7 @@ def fingerprint_bench(written: str, *, check: bool) -> ExitCode:
     wrong = dict.fromkeys(filter(None, (why_altered(bench, method) for method in methods)))
     if not check and not names_file(written):
         raise UsageError(
-            f"{written}: a shipped bench keeps its fingerprint; --check compares it, or name a file"
+            f"{written}: a shipped bench keeps its fingerprint; use --check, or name a file"
         )
     if not check and bench.known.fingerprint != now:
         text = with_known(source.text, {}, written)

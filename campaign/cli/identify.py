@@ -68,7 +68,7 @@ def identify_run(
     if all(each.result is None for each in identification.sections):
         reasons = (f"  {each.model.name}: {each.problem}" for each in identification.sections)
         refused = NoResultError(
-            "\n".join([f"{chosen.name}: nothing can be identified from it", *reasons])
+            "\n".join([f"{chosen.name}: no parameter can be identified", *reasons])
         )
         refused.exit_code = worst_exit_code([refused.exit_code, *map(_say_damaged, sides)])
         raise refused
@@ -88,7 +88,7 @@ def identify_run(
     if bench is not None:
         if text is None:
             print_note(f"page: {article}")
-            raise UsageError("--output: nothing that was found has a place in a bench file")
+            raise UsageError("--output: no result has a key in a bench file")
         print_note(f"bench: {bench}")
         for method, keys in keys_by_method(identification).items():
             print_note(f"  {method}: {', '.join(keys)}")

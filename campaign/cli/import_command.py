@@ -30,7 +30,7 @@ def import_recordings(
         )
     if Path(files[0]).is_file() and Path(files[0]).suffix.lower() != ".toml":
         raise UsageError(
-            f"{files[0]} is no mapping, which is a .toml file; `campaign import --guess "
+            f"{files[0]} is not a mapping (a .toml file); `campaign import --guess "
             f"{shlex.quote(files[0])} > mapping.toml` writes a first one"
         )
     request = Request(files[0], only, changes, IMPORT)

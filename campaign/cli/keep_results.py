@@ -24,7 +24,7 @@ def written_results(
     """
     if document.damaged and _found_when_whole(run):
         print_note(
-            f"{results_path(run.path)}: kept as it is: it was made when the run was not damaged",
+            f"{results_path(run.path)}: not changed: it was made before the run was damaged",
             style="yellow",
         )
         return None
@@ -38,7 +38,7 @@ def written_results(
     try:
         return prepare_results(run.path, results)
     except (ArchiveError, UsageError) as error:
-        print_note(f"no file of results: {error}", style="yellow")
+        print_note(f"no results file: {error}", style="yellow")
         return None
 
 

@@ -87,8 +87,8 @@ def show_kind(name: str) -> None:
             if kind.fit is not None:
                 print_line()
                 print_line(
-                    "Values that a test does not write follow from its bench where a default does "
-                    "not suit it: `campaign plan` shows them, and why."
+                    "If a default does not suit the bench, an omitted value follows from the "
+                    "bench: `campaign plan` shows the value and the reason."
                 )
             _show_needs(kind)
             if kind.model.name == name and kind.model.options is not kind.options:
@@ -115,7 +115,7 @@ def _show(
             infos = [i for i in infos if i.name == within or i.name.startswith(f"{within}.")]
         elif len(infos) > MOST and console().is_terminal:
             print_line(
-                f"{len(infos)} options; `campaign kinds {name}.TABLE` shows those of a table."
+                f"{len(infos)} options; `campaign kinds {name}.TABLE` shows the options of a table."
             )
             infos = [info for info in infos if "." not in info.name]
         rows = [_row(info) for info in infos]
@@ -156,11 +156,11 @@ def _show_needs(experiment: Experiment) -> None:
     rows += [(name, "optional", f"without it: no {what}") for name, what in optional]
     if rows:
         print_line()
-        print_table(("channel", "", "what it is for"), rows)
+        print_table(("channel", "", "purpose"), rows)
     stages = [(f"{n}, {stage.name}", stage.why) for n, stage in enumerate(experiment.stages, FIRST)]
     if stages:
         print_line()
-        print_table(("stage", "why it may follow"), stages)
+        print_table(("stage", "reason"), stages)
 
 
 def _show_channels() -> None:

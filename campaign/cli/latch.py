@@ -47,7 +47,7 @@ def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> 
         seen = latch.count
     if seen != latch.count:
         raise StillStoppedError(
-            f"--clear-stop {seen}: that is not the latest stop; the bench was {latch_text(latch)}; "
+            f"--clear-stop {seen}: not the latest stop; the bench was {latch_text(latch)}; "
             "nothing was moved"
         )
     try:
@@ -60,17 +60,17 @@ def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> 
 
 def latch_text(stop: PanicStop) -> str:
     """Text on a stop: who, when, and the count that clears it."""
-    when = "at a time that is not known" if stop.age is None else f"{clock(stop.age)} ago"
+    when = "at an unknown time" if stop.age is None else f"{clock(stop.age)} ago"
     return f"stopped by {stop.by}, {when} (stop {stop.count})"
 
 
 def _ask(found: PanicStop, stop: Callable[[], bool]) -> None:
     if not has_terminal():
         raise StillStoppedError(
-            f"the bench was {latch_text(found)}; nothing was moved. See why it was stopped, then "
-            f"add --clear-stop {found.count}"
+            f"the bench was {latch_text(found)}; nothing was moved. Find its reason, then add "
+            f"--clear-stop {found.count}"
         )
-    print_note("It stays off until that is cleared. Look at the bench first.")
+    print_note("The drive stays off until the stop is cleared. Check the bench first.")
     print_note("Type clear when it may move again: ")
     sys.stderr.flush()
     line = read_line(stop)

@@ -92,7 +92,7 @@ def show_models(
     chosen = list(_chosen(names, changes, bench))
     met = [_met(model, options, asked) for model, options in chosen]
     for each in met:
-        accuracy = f"half the step changes it by {number(100 * each.change, 2)} % at most"
+        accuracy = f"half the step changes it by at most {number(100 * each.change, 2)} %"
         print_line(f"{each.model.name}: {each.model.summary}; {accuracy}")
     with writing(path):
         path.write_text(draw(_figure(met, asked)), encoding="utf-8", newline="\n")
@@ -133,13 +133,13 @@ def _chosen(
         if isinstance(options, list):
             messages = (": ".join((*map(str, place), message)) for place, _, message in options)
             raise UsageError(
-                f"{name}: {'; '.join(messages)}; --set PARAMETER=VALUE states it, and "
+                f"{name}: {'; '.join(messages)}; --set PARAMETER=VALUE sets a value, and "
                 f"`campaign kinds {name}` lists all"
             )
         yield known[name], options
     for override in overrides:
         if (key := str(override.keys[1])) not in used:
-            raise UsageError(f"--set {key}: none of these models has it: {', '.join(names)}")
+            raise UsageError(f"--set {key}: not a parameter of {', '.join(names)}")
 
 
 def _met(model: AnyModel, options: Any, motion: MotionOptions) -> ModelCycle:

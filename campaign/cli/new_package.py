@@ -68,7 +68,9 @@ def package_files(kind: str, name: str) -> dict[str, str]:
 
 def _check_name(name: str) -> None:
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or len(name) > 60:
-        raise UsageError(f"{name!r} is no name: lower-case letters and digits, single _ between")
+        raise UsageError(
+            f"{name!r} is not valid: use lower-case letters and digits, with single _ between"
+        )
     spec = importlib.util.find_spec(name)  # a plain folder has one too, without an origin
     if keyword.iskeyword(name) or (spec is not None and spec.origin is not None):
-        raise UsageError(f"{name!r} is a name of Python or of an installed package; take another")
+        raise UsageError(f"{name!r} is a name of Python or of an installed package; use another")

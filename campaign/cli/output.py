@@ -237,7 +237,7 @@ def _joined(text: str) -> str:
 def open_page(page: Path) -> None:
     """Open a page in a browser; print a note without a browser."""
     if not webbrowser.open(page.resolve().as_uri()):
-        print_note("no browser was found; open the file by hand", style="yellow")
+        print_note("no browser available; open the file manually", style="yellow")
 
 
 def print_json(tree: Any) -> None:

@@ -35,7 +35,7 @@ def argument(metavar: str, told: str, **more: Any) -> Any:
 
 def workers_option(told: str) -> Any:
     """`--workers`: count of parallel items; by default one per processor."""
-    told = f"{told}; one per processor if absent."
+    told = f"{told}; default: one per processor."
     return option("--workers", "N", told, min=1, max=256)
 
 
@@ -50,40 +50,40 @@ Protocol = Annotated[
 Run = Annotated[str, argument("RUN", f"{RUN}.", autocompletion=complete_run)]
 NewestRun = Annotated[
     str | None,
-    argument("[RUN]", f"{RUN}; the newest when absent.", autocompletion=complete_run),
+    argument("[RUN]", f"{RUN}; default: the newest.", autocompletion=complete_run),
 ]
 Bench = Annotated[
     str, typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name.")
 ]
-Results = Annotated[Path, option("--results", "DIR", "Where the archives are.")]
+Results = Annotated[Path, option("--results", "DIR", "Folder of the archives.")]
 Only = Annotated[list[str] | None, several("--only", "TEST", "Only this test")]
 Set = Annotated[
     list[str] | None,
     several("--set", "PATH=VALUE", "Change a value of the protocol, a bench or the backend"),
 ]
-Backend = Annotated[str, option("--backend", "NAME", "What executes the trials.")]
+Backend = Annotated[str, option("--backend", "NAME", "Backend of the trials.")]
 Large = Annotated[bool, flag("--allow-large", "Accept a plan of more than 100 000 trials.")]
-Open = Annotated[bool, flag("--open", "Open it in a browser.")]
+Open = Annotated[bool, flag("--open", "Open the page in a browser.")]
 Json = Annotated[bool, flag("--json", "Print JSON for machines.")]
 Templates = Annotated[
     Path | None,
     option(
         "--templates",
         "DIR",
-        "Templates that win over the packaged ones; they are code, so trust them.",
+        "Templates that override the packaged ones; they are code, so trust them.",
     ),
 ]
 Format = Annotated[
     list[str] | None, several("--format", "NAME", "Besides the page: markdown, latex, pdf")
 ]
-Workers = Annotated[int | None, workers_option("Trials executed at once, where the backend can")]
+Workers = Annotated[int | None, workers_option("Parallel trials, if the backend permits")]
 Watch = Annotated[bool, flag("--watch", "Draw channels of the running trial in the terminal.")]
 Executor = Annotated[
     str,
     option(
         "--executor",
         "WHERE",
-        "Execute simulated trials on a Dask cluster: dask (of this machine), or "
+        "Execute simulated trials on a Dask cluster: dask (on this machine), or "
         "dask://HOST:PORT of a scheduler.",
     ),
 ]
@@ -95,21 +95,24 @@ Tls = Annotated[
         "Folder with ca.pem, cert.pem and key.pem for a scheduler on another machine.",
     ),
 ]
-Report = Annotated[bool, flag("--report", "Build the report as well.")]
-Yes = Annotated[bool, flag("--yes", "For scripts: do not prompt, also not before a bench moves.")]
+Report = Annotated[bool, flag("--report", "Also build the report.")]
+Yes = Annotated[bool, flag("--yes", "For scripts: no prompt, not even before a bench moves.")]
 ClearStop = Annotated[
     int | None,
     option(
-        "--clear-stop", "COUNT", "Clear a panic stop, by the count that a person has seen.", min=0
+        "--clear-stop",
+        "COUNT",
+        "Clear the panic stop of this count, seen by a person.",
+        min=0,
     ),
 ]
 Port = Annotated[
     str | None,
-    option("--port", "PORT", "Where the controller is; short for --set backend.port=PORT."),
+    option("--port", "PORT", "Port of the controller; short for --set backend.port=PORT."),
 ]
-Controller = Annotated[str, option("--port", "PORT", "Where the controller is.")]
-Baud = Annotated[int, option("--baud", "RATE", "Of a serial port.", min=1200)]
-Patience = Annotated[float, option("--patience", "S", "Until it gives up.", min=0.1, max=600.0)]
+Controller = Annotated[str, option("--port", "PORT", "Port of the controller.")]
+Baud = Annotated[int, option("--baud", "RATE", "Rate of a serial port.", min=1200)]
+Patience = Annotated[float, option("--patience", "S", "Time limit (s).", min=0.1, max=600.0)]
 From = Annotated[
     str | None, option("--from", "RUN", "The run to replay; short for --set backend.run=RUN.")
 ]
@@ -118,7 +121,7 @@ Handover = Annotated[
     option(
         "--handover",
         "DIR",
-        "Where trials are handed out, with --backend files; short for --set backend.folder=DIR.",
+        "Folder of handed-out trials, with --backend files; short for --set backend.folder=DIR.",
     ),
 ]
 Truth = Annotated[
@@ -126,7 +129,7 @@ Truth = Annotated[
     option(
         "--truth",
         "BENCH",
-        "What sim simulates in place of each test's bench; plan and analysis do not know it.",
+        "Bench that sim simulates in place of each test's; plan and analysis do not use it.",
     ),
 ]
 Sign = Annotated[
@@ -134,7 +137,6 @@ Sign = Annotated[
     option(
         "--sign",
         "FILE",
-        "Sign the sealed run with this key of OpenSSH, or with its agent; tried before "
-        "anything moves.",
+        "Sign the sealed run with this OpenSSH key, or with its agent; tested before any motion.",
     ),
 ]

@@ -90,7 +90,7 @@ def _print(
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
         f"{_trials(len(plan.trials))}, {clock(plan.duration)} of bench time; backend "
-        f"{prepared.kind.name}; would write {archive}, at most {bytes_text(plan.size)}"
+        f"{prepared.kind.name}; output {archive}, at most {bytes_text(plan.size)}"
     )
     if (most := plan.following).trials:
         print_line(f"later stages add {in_short(most)}, in the size above")
@@ -98,7 +98,9 @@ def _print(
         print_line(line)
     unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
     if unseeded:
-        print_note(f"shuffled: {', '.join(unseeded)}; a test without `seed` draws one per run")
+        print_note(
+            f"shuffled: {', '.join(unseeded)}; a test without `seed` draws a new seed for each run"
+        )
     print_line()
     headings = ("test", "kind", "bench", "trials", "bench time", "closest limit")
     print_table(headings, [_row(test) for test in plan.tests], spare=("bench", "kind"))
@@ -155,7 +157,7 @@ def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
         done = trial.setup
     yield from steps[:NOTES]
     if len(steps) > NOTES:
-        yield f"and {len(steps) - NOTES} more steps by hand; --json has them all"
+        yield f"and {len(steps) - NOTES} more steps by hand; --json lists all"
 
 
 KEPT = {
@@ -169,7 +171,7 @@ def policy_lines(policy: Policy) -> Iterator[str]:
     """Lines on the protocol's policy: faults, rests, kept samples."""
     if policy.faults:
         responses = (f"{name}: {_response(one)}" for name, one in policy.faults.items())
-        others = () if "default" in policy.faults else ("else: skip",)
+        others = () if "default" in policy.faults else ("others: skip",)
         yield f"faults: {'; '.join((*responses, *others))}"
     if policy.rest is not None:
         pause, every = clock(policy.rest.pause), clock(policy.rest.every)
@@ -209,7 +211,7 @@ def _print_needed(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, s
 
 def _print_chosen(test: PlannedTest) -> None:
     if test.chosen:
-        print_line("  not written, and chosen for this bench:")
+        print_line("  not stated; chosen for this bench:")
     for line in chosen_lines(test):
         print_line(f"    {line}")
 
@@ -222,10 +224,10 @@ def _print_details(
     print_line(f"{test.name}{f': {test.title}' if test.title else ''}")
     warm_ups = sum(trial.role is Role.WARM_UP for trial in trials)
     if warm_ups:
-        print_line(f"  {warm_ups} of the trials warm up and are not analysed")
+        print_line(f"  {warm_ups} of the trials warm up and are not analyzed")
     checks = sum(trial.role is Role.CHECK for trial in trials)
     if checks:
-        print_line(f"  {checks} of the trials check that the bench is still the same")
+        print_line(f"  {checks} of the trials check the bench for changes")
     for line in _by_hand(trials):
         print_line(f"  {line}")
     for use in _closest(test):
@@ -253,7 +255,7 @@ def _print_details(
     for note, count in notes.most_common(NOTES):
         print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")
     if len(notes) > NOTES:
-        print_line(f"  and {len(notes) - NOTES} more notes; --json has them all")
+        print_line(f"  and {len(notes) - NOTES} more notes; --json lists all")
     print_line()
 
 
@@ -361,4 +363,4 @@ def cost_lines(cost: Cost) -> Iterator[str]:
     yield line
     if cost.alone:
         which = "it is" if cost.alone == 1 else f"{cost.alone} of the trials are"
-        yield f"{which} simulated alone: too few of the plan have the same structure"
+        yield f"{which} simulated alone: too few trials have the same structure"

@@ -103,12 +103,12 @@ def _check_keep(plan: Plan, kind: BackendKind) -> None:
         experiment = experiments().get(trial.kind)
         if experiment is None or experiment.needs_samples:
             raise UsageError(
-                f"keep = {keep!r}: {trial.kind!r} (test {trial.test!r}) is analysed from samples, "
-                "not from metrics alone; leave 'keep' out, or that test (--only)"
+                f"keep = {keep!r}: the analysis of {trial.kind!r} (test {trial.test!r}) needs "
+                "samples; leave 'keep' out, or that test (--only)"
             )
     if plan.stages:
         raise UsageError(
-            f"keep = {keep!r}: trials of {plan.stages[0].test!r} follow from samples of others; "
+            f"keep = {keep!r}: later stages of {plan.stages[0].test!r} need samples; "
             "leave 'keep' out"
         )
 
@@ -136,9 +136,8 @@ def _check_recordings(protocol: Protocol, kind: BackendKind) -> None:
     for test in protocol.tests:
         if test.entry.recording:
             message = (
-                f"the test '{test.entry.name}' was executed elsewhere: `campaign import "
-                f"{protocol.path}` makes a run of it, `campaign plan {protocol.path} --backend "
-                f"{IMPORT}` shows it"
+                f"the test '{test.entry.name}' has recordings: `campaign import {protocol.path}` "
+                f"archives them, `campaign plan {protocol.path} --backend {IMPORT}` shows them"
             )
             raise ProtocolError([test.origin.problem(("recording",), "key", message)])
 
@@ -161,13 +160,13 @@ def open_backend(
         backend.simulate_instead(truths or {})
     elif kind.source is not Source.RECORDING and (named := [t for t in trials if t.truth]):
         raise UsageError(
-            f"the test {named[0].test!r} has a truth, and only a simulation can have one that is "
-            f"chosen: leave it out, or take another backend than {kind.name!r}"
+            f"the test {named[0].test!r} states a truth, which only a simulation can use: remove "
+            f"it, or use another backend than {kind.name!r}"
         )
     if kind.source is not Source.RECORDING and (named := [t for t in trials if t.recording]):
         raise UsageError(
-            f"{named[0].name} ({named[0].label}) was executed elsewhere, and nothing here can "
-            "repeat it: `campaign import` reads its files again, `--backend replay` its archive"
+            f"{named[0].name} ({named[0].label}) is imported and cannot be repeated: "
+            "`campaign import` reads its files again, `--backend replay` its archive"
         )
     source = archive_of(backend)
     refusal = ArchiveError if source is not None and source.damaged else UsageError
@@ -227,12 +226,12 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
         tables = ", ".join(f"[columns.NAME.{name}]" for name in names)
         return (
             f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}\n"
-            f"its mapping makes {recorded}: say by {tables} which column it is"
+            f"its mapping has {recorded}: assign a column by {tables}"
         )
     return (
         f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}; "
         f"the backend {kind.name!r} does not record it\n"
-        f"record it, take another backend, or leave out the test {trial.test!r}; nothing was moved"
+        f"record it, use another backend, or leave out the test {trial.test!r}; nothing was moved"
     )
 
 

@@ -10,17 +10,17 @@ from campaign.stopwatch import Spent, Stopwatch, Work
 
 REST = "everything else"
 FASTER = {
-    Work.PREPARING: "a smaller matrix, or `--only TEST`, is a shorter plan",
-    Work.COMPILING: "it is done once per installation; `campaign warmup` does it before a run",
-    Work.SETTING_UP: "it is paid per trial: fewer and longer trials cost less",
-    Work.ENGINE: "shorter trials, `--workers`, or a longer step where the error allows it "
-    "(`backend.longest_step`); the fastest sine and the stiffest contact make steps short",
-    Work.SAMPLES: "a lower sample_rate records less",
-    Work.TRIAL_FILES: "a lower sample_rate, or fewer and longer trials; a faster disk",
-    Work.MEASURING: "a lower sample_rate records less to be looked at",
-    Work.WAITING: "more `--workers`, if processors were idle; a bench that moves sets its own pace",
-    Work.SEALING: "a lower sample_rate, or fewer and longer trials; a faster disk",
-    Work.REPORT: "leave --report out; `campaign report` makes it at any time",
+    Work.PREPARING: "reduce the matrix, or use `--only TEST`",
+    Work.COMPILING: "done once per installation; `campaign warmup` does it before a run",
+    Work.SETTING_UP: "a cost of each trial: use fewer and longer trials",
+    Work.ENGINE: "use shorter trials, `--workers`, or a longer step if the error permits "
+    "(`backend.longest_step`); the fastest sine and the stiffest contact limit the step",
+    Work.SAMPLES: "reduce the sample_rate",
+    Work.TRIAL_FILES: "reduce the sample_rate; use fewer, longer trials or a faster disk",
+    Work.MEASURING: "reduce the sample_rate",
+    Work.WAITING: "more `--workers`, if processors were idle; a real bench sets its own pace",
+    Work.SEALING: "reduce the sample_rate; use fewer, longer trials or a faster disk",
+    Work.REPORT: "leave --report out; `campaign report` makes it later",
 }
 """Advice that reduces the time, by kind of work."""
 
@@ -65,4 +65,4 @@ def print_profile(stopwatch: Stopwatch, workers: int) -> None:
     longest = max(table, key=lambda row: row.clock)
     hint = FASTER.get(Work(longest.what)) if longest.what != REST else None
     if hint:
-        print_note(f"most of it: {longest.what}; {hint}")
+        print_note(f"longest: {longest.what}; {hint}")

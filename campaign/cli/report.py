@@ -106,7 +106,7 @@ def _say(report: Report, path: Path, kept: Sequence[str], *, measure_anew: bool)
     if any(test.problem and test.experiment for test in lacking):
         anew = " --measure-anew" if measure_anew else ""
         command = f"{DEBUG}=1 campaign report {reference(path)}{anew}"
-        print_note(f"to see where an analysis failed:\n  {command}")
+        print_note(f"to locate the failure of an analysis:\n  {command}")
     print_note(f"written: {'; '.join([*_told(report.files), *filter(None, kept)])}")
     return worst_exit_code(codes)
 
@@ -131,7 +131,7 @@ def _published(results: PreparedResults) -> str:
     try:
         return str(results.publish())
     except ArchiveError as error:
-        print_note(f"no file of results: {error}", style="yellow")
+        print_note(f"no results file: {error}", style="yellow")
         return ""
 
 
@@ -158,7 +158,7 @@ def _wanted_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
 
     chosen = chosen_trials(run, wanted)
     if wanted and not chosen:
-        print_note(f"--trials {wanted}: there is none, so no page of a trial is made for it")
+        print_note(f"--trials {wanted}: no such trial, so no page is made for it")
     return chosen
 
 

@@ -77,8 +77,8 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
         return code
     if not simulated:
         print_note(
-            f"{run.name} was executed on {run.header.backend!r}: its samples were measured, those "
-            "beside them are the simulation's"
+            f"{run.name} was executed on {run.header.backend!r}: this compares measured samples "
+            "with simulated ones"
         )
     (again,) = open_run(outcome.archive).trials
     engine = int(run.header.versions.get("engine", FIRST)) if simulated else ENGINE
@@ -144,7 +144,7 @@ def _say_change(
     if before.ending.outcome is not again.ending.outcome:
         verdict = f"different: {before.ending.outcome} → {again.ending.outcome}"
     elif _is_noisy(bench):
-        verdict = "not to be judged, as engines draw the noise of its sensors differently"
+        verdict = "no verdict: the engines draw sensor noise differently"
     elif beyond:
         verdict = f"different in {', '.join(beyond)}"
     else:

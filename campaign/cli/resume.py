@@ -101,7 +101,7 @@ def resume_run(
             rehearse_signing(sign)
         backend = open_backend(remade.kind, remade.options, left, remade.truths)
         wait_until_compiled(compiling, backend, left)
-    print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} are left")
+    print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} remain")
     if remade.kind.by_hand:
         say_by_hand(remade.options)
     allow_motion(remade.kind, left, remade.tests, yes=yes)
@@ -117,7 +117,9 @@ def resume_run(
             changes=remade.changes,
         )
         if signed:
-            print_warning(f"{run.name}: was signed; it changes, so its signature is set aside")
+            print_warning(
+                f"{run.name}: was signed; the run changes, so the old signature is renamed"
+            )
         return writer
 
     with where.opened(backend, left, workers) as (at_once, executor):
@@ -148,12 +150,12 @@ def remake(run: RunReader, port: str | None = None) -> Remade:
         run = _at_port(run, port)
     protocol, truth = Path(run.header.protocol_path), run.header.truth.option
     if names_file(truth) and not Path(truth).exists():
-        print_warning(f"the truth {truth} is gone: going on with the plan that is in the archive")
+        print_warning(f"the truth {truth} does not exist: continuing with the archived plan")
         return _from_archive(run)
     if run.header.protocol_path and protocol.exists():
         return _from_protocol(run, protocol)
-    where = f"the protocol {protocol} is gone" if run.header.protocol_path else "no protocol's file"
-    print_warning(f"{where}: going on with the plan that is in the archive")
+    where = f"no protocol {protocol}" if run.header.protocol_path else "no protocol file"
+    print_warning(f"{where}: continuing with the archived plan")
     return _from_archive(run)
 
 
@@ -188,8 +190,8 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
     if not same_list(run.first_stage, plan.trials):
         why = f":\n{listed(changes)}" if changes else ""
         raise UsageError(
-            f"{run.name}: its {len(run.first_stage)} trials are not those that {protocol} makes "
-            f"today ({len(plan.trials)}){why}\nstart a new run"
+            f"{run.name}: its {len(run.first_stage)} trials differ from the present ones of "
+            f"{protocol} ({len(plan.trials)}){why}\nstart a new run"
         )
     check_limits(plan)
     check_loops(plan)
@@ -231,10 +233,10 @@ def _check_truth(run: RunReader, trials: Sequence[Trial]) -> None:
     had = run.header.truth.plants.keys()
     if truths <= had and bool(truths) == bool(had):
         return
-    what = "has no truth today" if not truths else "was begun with another truth, or with none"
+    what = "has no truth now" if not truths else "was started with another truth, or none"
     raise UsageError(
-        f"{run.name}: {what}: its trials would be others, also with --accept-changes; start a new "
-        "run, or give the truth back what it was"
+        f"{run.name}: {what}: its trials would differ, also with --accept-changes; start a new "
+        "run, or restore the truth"
     )
 
 
@@ -244,6 +246,6 @@ def _check_changes(run: RunReader, changes: Sequence[str], *, accepted: bool) ->
     text = f"{run.name}: changed since the start of the run (SI units):\n{listed(changes)}"
     if not accepted:
         raise UsageError(
-            f"{text}\n--accept-changes continues with the new values, and archives that"
+            f"{text}\n--accept-changes continues with the new values, and archives the changes"
         )
     print_warning(text)

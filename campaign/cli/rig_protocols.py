@@ -25,7 +25,7 @@ from campaign.resources import protocols_folder
 
 WIDTH = 98
 TEMPLATES = Path(__file__).with_name("rig_protocol_templates")
-PILOT = "pilot = true    # no Stribeck curve is described: ten speeds determine the others\n"
+PILOT = "pilot = true    # no Stribeck curve is stated: ten speeds determine the others\n"
 
 
 @unwinding()
@@ -71,7 +71,7 @@ def _check_fit(name: str, experiment: Experiment, bench: Bench) -> None:
             with axis_terms(bench.sides):
                 experiment.fit(experiment.options(), bench)
     except (ValueError, ArithmeticError) as error:
-        raise UsageError(f"{bench.name}: no {name} fits it: {error}") from None
+        raise UsageError(f"{bench.name}: no {name} test suits it: {error}") from None
 
 
 def _source(written: str) -> Path:
@@ -121,7 +121,7 @@ def _with_reasons(path: Path) -> None:
 def _comments(lines: Iterator[str]) -> Iterator[str]:
     listed = list(lines)
     if listed:
-        yield "# Today it follows from the bench:\n"
+        yield "# It follows from the present bench:\n"
     for line in listed:
         wrapped = textwrap.wrap(line, WIDTH, initial_indent="#   ", subsequent_indent="#     ")
         yield "".join(f"{each}\n" for each in wrapped)

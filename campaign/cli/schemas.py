@@ -24,8 +24,8 @@ SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
 }
 FOLDER = "schemas"
 RULES = """\
-# Which JSON Schema an editor holds each file against (taplo, Even Better TOML).
-# `campaign schema protocol` and `campaign schema bench` write them anew.
+# JSON Schema of each file, for editors (taplo, Even Better TOML).
+# `campaign schema protocol` and `campaign schema bench` print them.
 [[rule]]
 include = ["**/*.toml"]
 exclude = ["**/benches/**", "**/calibration/**", "**/.taplo.toml"]

@@ -198,7 +198,7 @@ def _what_is_kept(folder: Path) -> str:
     """Message at an immediate exit: folder of the run, or its sealed archive."""
     sealed = folder.with_suffix(SEALED)
     if sealed.is_file():
-        return f"left at once; the run is in {sealed}"
+        return f"stopped at once; the run is in {sealed}"
     if not folder.exists():
         return NOTHING_BEGUN
     return f"stopped at once; the finished trials are in {folder}; {how_to_go_on(folder)}"
@@ -288,7 +288,7 @@ def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
     reason = f" ({outcome.reason})" if outcome.reason else ""
     go_on = ""
     if outcome.status in (RunStatus.INTERRUPTED, RunStatus.FAULT):
-        go_on = f"; to go on from there:\n{typed('resume', reference(outcome.archive))}"
+        go_on = f"; to continue:\n{typed('resume', reference(outcome.archive))}"
     print_note(f"{outcome.status.value}{reason}: {counts}, in {clock(elapsed)}{go_on}")
     if outcome.exit_code is ExitCode.NOT_SAFE:
         print_note(NOT_SAFE, "bold red")
@@ -340,7 +340,7 @@ def require_watch(executor: str) -> None:
     if importlib.util.find_spec("plotext") is None:
         raise UsageError("--watch needs plotext: pip install 'campaign[watch]'")
     if executor:
-        raise UsageError("--watch shows trials of this process; leave --executor out")
+        raise UsageError("--watch shows only trials of this process; leave --executor out")
 
 
 @contextmanager

@@ -63,7 +63,7 @@ def _print(run: RunReader, story: Lines) -> None:
         ]
         print_table(headings, listed, spare=(*none, "kind"))
     if idle := [row[0] for row in tests if row[0] not in begun and shown]:
-        print_line(f"no trial was executed of {', '.join(idle)}")
+        print_line(f"no trial executed: {', '.join(idle)}")
     failed = [each for each in run.outlines if each.outcome is not Outcome.COMPLETED]
     rows = [(_name(t.number), t.label, t.outcome.value, t.reason) for t in failed]
     _section(("trial", "what", "outcome", "reason"), rows)
@@ -81,9 +81,9 @@ def _print_metrics(run: RunReader) -> None:
         for trial in run.trials
         for estimate in trial.estimates
     ]
-    _section(("trial", "what", "quantity", "value (95 %)", "unit", "without, because"), rows)
+    _section(("trial", "what", "quantity", "value (95 %)", "unit", "reason"), rows)
     if not rows:
-        print_line("no metrics are archived with this run")
+        print_line("this run has no archived metrics")
 
 
 def _metric(found: Estimate) -> tuple[str, ...]:
@@ -208,7 +208,7 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
 def _truth(truth: Truth) -> str:
     """Text on the truths that were simulated in place of the stated benches."""
     names = ", ".join(dict.fromkeys(str(plant.get("name")) for plant in truth.plants.values()))
-    return f"{names} ({', '.join(truth.sources)}), simulated in place of what is stated" * bool(
+    return f"{names} ({', '.join(truth.sources)}), simulated in place of the stated bench" * bool(
         names
     )
 

@@ -36,8 +36,8 @@ def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitC
     sealed = find_run(results, name)
     if not sealed.is_file():
         raise UsageError(
-            f"{sealed}: is not sealed, and only a sealed run is signed; "
-            f"`campaign resume {reference(sealed)}` goes on to its end"
+            f"{sealed}: is not sealed, and only a sealed run can be signed; "
+            f"`campaign resume {reference(sealed)}` completes it"
         )
     from campaign.archive.verification.verify_run import verify_run
 
@@ -48,7 +48,7 @@ def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitC
         if problems:
             raise ArchiveError(
                 f"{sealed}: is not sound ({problems[0]}), and was not signed; "
-                f"`campaign verify {reference(sealed)}` lists everything"
+                f"`campaign verify {reference(sealed)}` lists all problems"
             )
         _sign(sealed, key, replace=replace)
     print_line(str(signature_path(sealed)))
@@ -60,8 +60,8 @@ def rehearse_signing(key: Path) -> None:
     made = signing.sign_test_text(key, ask=has_terminal())
     if made.asked:
         print_note(
-            "the passphrase is asked for again when the run is sealed; with an agent "
-            f"(`ssh-add {key}`) no person has to be there",
+            "the passphrase is needed again when the run is sealed; with an agent "
+            f"(`ssh-add {key}`) there is no prompt",
             "yellow",
         )
 
@@ -86,7 +86,7 @@ def sign_new_run(sealed: Path, key: Path) -> ExitCode:
 def _say_unsigned(sealed: Path, reason: str) -> None:
     print_note(
         f"NOT SIGNED: {reason}\n"
-        f"the run itself is kept; `campaign sign {reference(sealed)} --key FILE` signs it",
+        f"the run is kept; `campaign sign {reference(sealed)} --key FILE` signs it",
         "yellow",
     )
 
@@ -107,8 +107,8 @@ def _locked(sealed: Path) -> Iterator[None]:
 def _check_free(sealed: Path, *, replace: bool) -> None:
     if has_signature(sealed) and not replace:
         raise UsageError(
-            f"{signature_path(sealed)}: the run is signed already; --replace sets that signature "
-            "aside, and removes nothing"
+            f"{signature_path(sealed)}: the run is signed already; --replace renames that "
+            "signature, and removes nothing"
         )
 
 
@@ -121,7 +121,7 @@ def _sign(sealed: Path, key: Path, *, replace: bool) -> None:
     try:
         old = set_aside_signature(sealed, "replaced")
     except OSError as error:
-        raise ArchiveError(f"{signature_path(sealed)}: cannot be set aside: {why(error)}") from None
+        raise ArchiveError(f"{signature_path(sealed)}: cannot be renamed: {why(error)}") from None
     write_signature(sealed, made.text)
     if old:
         print_note(f"the earlier signature is now {old}")

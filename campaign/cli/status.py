@@ -57,10 +57,10 @@ def show_status(port: str, baud: int, patience: float, *, as_json: bool) -> Exit
     finally:
         line.close()
     if not answers.whole:
-        older = "it is of an earlier version, which cannot say" if answers.refused else ""
+        older = "its firmware is too old for this query" if answers.refused else ""
         raise BackendError(
-            f"{port}: {older or f'no answer from a controller for {patience:g} s'}; is it the "
-            "right port and baud rate, and is the firmware of this program's version?"
+            f"{port}: {older or f'no answer from a controller for {patience:g} s'}; check "
+            "port and baud rate, and whether the firmware has this program's version"
         )
     _show(answers, as_json=as_json)
     return ExitCode.DONE
@@ -100,9 +100,9 @@ def _show(answers: Answers, *, as_json: bool) -> None:
 
 
 def _held(holder: Holder, host: str) -> str:
-    name = host or "a host that did not say its name"
+    name = host or "an unnamed host"
     if holder.held:
         return f"by {name}"
     if holder.age is None:
-        return f"by nobody; the last was {name}" if host else "by nobody"
-    return f"by nobody; {name} was heard {clock(holder.age)} ago"
+        return f"no; the last host was {name}" if host else "no"
+    return f"no; {name} was heard {clock(holder.age)} ago"

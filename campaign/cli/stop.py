@@ -94,7 +94,7 @@ def stop_bench(port: str, baud: int, patience: float) -> ExitCode:
     if not attempt.latched:
         print_line(NOT_LATCHED)
         print_note(
-            "Older firmware: the program that runs the controller can switch it on again. "
+            "Old firmware: the program that runs the controller can switch the drive on again. "
             "End that program, or cut the drive's power.",
             "bold red",
         )
@@ -113,7 +113,7 @@ def _not_confirmed(why: str) -> ExitCode:
 def _why(watch: SafeWatch, patience: float) -> str:
     status = watch.last
     if status is None:
-        return f"no word from the controller for {patience:g} s"
+        return f"no message from the controller for {patience:g} s"
     rest = "at rest" if status.at_rest else "moving"
     drive = "on" if status.drive_on else "off"
-    return f"the controller says: {status.state.text}, {rest}, drive {drive}"
+    return f"the controller reports: {status.state.text}, {rest}, drive {drive}"

@@ -77,7 +77,7 @@ def trend_of_archives(
 def _exchange(results: Path, told: str) -> tuple[str, Path]:
     source, at, run = told.rpartition("@")
     if not (at and source.strip() and run.strip()):
-        raise UsageError(f'--exchanged {told!r}: say it as "torque constant@RUN"')
+        raise UsageError(f'--exchanged {told!r}: write "torque constant@RUN"')
     return source.strip(), find_run(results, run.strip())
 
 
@@ -116,8 +116,8 @@ def _tell(trends: Trends) -> None:
         print_line(f"not judged, {why}", 2)
     rest = trends.of(Verdict.NOT_SHOWN)
     if rest:
-        heads = ["no trend shown", f"seen from, per {trends.covariate.per}"]
-        heads += ["jump seen from"] if trends.covariate.ordered else []
+        heads = ["no significant trend", f"detectable, per {trends.covariate.per}"]
+        heads += ["detectable jump"] if trends.covariate.ordered else []
         rows = [
             [
                 f"{each.series.test}: {each.series.name}",

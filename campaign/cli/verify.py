@@ -36,7 +36,7 @@ def verify_archives(
             kept = _of_results(path)
             checks.append((kept, check_signature(path, None)))
             if kept.sound and not as_json:
-                print_line(f"{path}: sound (holds results of a run, and no run)")
+                print_line(f"{path}: sound (results of a run, not a run)")
             elif not as_json:
                 _print_problems(kept)
             continue
@@ -76,7 +76,7 @@ def _print(found: Verification, signature: SignatureCheck) -> None:
     for damage in found.remarks:
         print_note(f"{found.path}: note: {damage}", style="yellow")
     if signature.valid and not found.sound:
-        print_line(f"{signature.text}; but the run is not what was signed")
+        print_line(f"{signature.text}; but the run differs from the signed one")
     elif signature.valid is not None:
         print_line(signature.text)
     elif signature.text:
@@ -118,7 +118,7 @@ def _bytes(path: Path) -> int:
     return 0
 
 
-RECOMPUTED = "anyone who changes a run can compute its checksums anew; only a signature shows that"
+RECOMPUTED = "a changed run can have new checksums; only a signature shows the change"
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def _unchecked(run: Path, file: str) -> SignatureCheck:
     if not run.is_file():
         return SignatureCheck("", None, "")
     if file:
-        hint = "--signer NAME --allowed-signers FILE say by whom"
+        hint = "use --signer NAME --allowed-signers FILE"
         return SignatureCheck(
             file, None, f"{run}: note: {file} was not checked ({hint}); {RECOMPUTED}"
         )

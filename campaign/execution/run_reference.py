@@ -17,9 +17,7 @@ def reference(run: Path) -> str:
 def how_to_go_on(run: Path) -> str:
     """Suggested commands for an unfinished run, each on its own line."""
     name = reference(run)
-    return (
-        f"to see them, and to go on from there:\n{typed('report', name)}\n{typed('resume', name)}"
-    )
+    return f"to see them, and to continue:\n{typed('report', name)}\n{typed('resume', name)}"
 
 
 def typed(command: str, *words: str) -> str:

@@ -32,28 +32,28 @@ Mark = Literal["inconsistent", "not reproducible"]
 
 
 class Part(Options):
-    """Properties of the cells of a table, a row or a column; the inner ones win."""
+    """Data of a table, row or column on its cells; the innermost has priority."""
 
     symbol: str = ""
     """Symbol in the document, e.g. σ2."""
     quantity: str | None = None
-    """Name of the quantity in findings, e.g. stabilization_error."""
+    """Its name in a finding, e.g. stabilization_error."""
     unit: str | None = None
-    """The unit of the printed number; absent for a number without one."""
+    """Unit of the printed number; absent for a number without unit."""
     relation: Relation | None = None
-    """Claim of the document: this value (the default), near it, at most or at least it; or its
-    place in an order, or a mark on a scale."""
+    """Claim of the document: this value (default), near it, at most or at least it. Or: a rank in
+    an order, or a mark on a scale."""
     decimals: int | None = Field(default=None, ge=0, le=12)
     """Printed decimal places."""
     conditions: dict[str, str | int | float | bool] = {}
-    """Conditions of a finding of this number: text, numbers, or text with a unit."""
+    """Conditions of a matching finding: text, numbers, or text with a unit."""
 
 
 class Names(Options):
-    """Condition that the names of a table's rows, or columns, are values of."""
+    """Condition that the names of rows or columns are values of."""
 
     condition: str
-    """The condition, e.g. compensation, frequency."""
+    """Name of the condition, e.g. compensation, frequency."""
     unit: str = ""
     """Unit of names that are numbers."""
     names: tuple[str, ...] = ()
@@ -64,12 +64,12 @@ class MarkOptions(Options):
     """A remark on some cells of a table."""
 
     cells: tuple[str, ...] = Field(min_length=1)
-    """`row/column` or `row`; `*` stands for all of them."""
+    """`row/column` or `row`; `*` means all of them."""
     status: Mark | None = None
-    """Whether the document contradicts itself there, or the value is not reproducible."""
+    """`inconsistent`: the document contradicts itself; or `not reproducible`."""
     repeats: tuple[str, ...] = ()
-    """Tables, rows or cells with the same condition, or that they follow from: fitted there, or
-    seen there, is fitted or seen here."""
+    """Tables, rows or cells with the same condition, or from which these cells follow. If they are
+    fitted or seen, so are these cells."""
     reason: str = Field(min_length=1)
     """Reason, or remark."""
 
@@ -83,17 +83,17 @@ class TableOptions(Part):
     ]
     """Its number: 5.8, or `figure 5.14`, `text 4.2.3`."""
     title: str
-    """Content of the table."""
+    """Its content."""
     domain: Literal["", "simulation", "hardware"] = ""
-    """Origin in the document; for reader and headline, not matched."""
+    """Its origin in the document; for reader and headline, not matched."""
     rows: Names | None = None
     """Condition of the row names."""
     columns: Names | None = None
     """Condition of the column names."""
     row: dict[str, Part] = {}
-    """Rows with more properties than their name."""
+    """Rows with more data than their name."""
     column: dict[str, Part] = {}
-    """Columns with more properties than their name, in printed order."""
+    """Columns with more data than their name, in printed order."""
     cells: dict[str, tuple[float | None, ...]] = Field(min_length=1)
     """The printed numbers: row name to one number per column; `""` for an empty cell."""
     mark: tuple[MarkOptions, ...] = ()
@@ -150,11 +150,11 @@ class PublishedOptions(Options):
     source: str
     """Title of the document."""
     author: str = ""
-    """Its author."""
+    """Author."""
     institution: str = ""
-    """Its institution."""
+    """Institution."""
     year: int | None = None
-    """Its year."""
+    """Year."""
     table: tuple[TableOptions, ...] = ()
     """Its tables."""
 

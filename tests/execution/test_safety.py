@@ -145,8 +145,8 @@ def test_a_stop_by_force_is_made_safe_and_says_what_is_kept_and_how_to_go_on() -
     assert backend.log == ["made safe"]
     assert aborted.value.exit_code is ExitCode.INTERRUPTED
     assert str(aborted.value) == (
-        f"stopped at once; the finished trials are in {RUN}; to see them, and to go on from "
-        "there:\n  campaign report run\n  campaign resume run"
+        f"stopped at once; the finished trials are in {RUN}; to see them, and to continue:\n"
+        "  campaign report run\n  campaign resume run"
     )
     with (
         pytest.raises(AbortedError, match=r"^stopped at once$"),

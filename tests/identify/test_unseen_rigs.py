@@ -224,6 +224,6 @@ def test_what_no_method_can_use_is_told_line_by_line(tmp_path: Path) -> None:
     with pytest.raises(NoResultError) as refused:
         identify_run(run.stem, results)
     first, *others = str(refused.value).splitlines()
-    assert first.endswith("nothing can be identified from it")
+    assert first.endswith("no parameter can be identified")
     assert sum(line.startswith("  inverse_dynamics: nothing is recorded") for line in others) == 1
     assert all(line.startswith("  ") for line in others)

@@ -228,7 +228,7 @@ def test_an_imported_run_is_verified_and_replayed_and_not_rerun(tmp_path: Path, 
     assert code is ExitCode.DONE
     archive = next((tmp_path / "r").glob("*.nxs"))
     assert verify_archives([str(archive)], tmp_path / "r", as_json=False) is ExitCode.DONE
-    with pytest.raises(UsageError, match="executed elsewhere, and nothing here can repeat"):
+    with pytest.raises(UsageError, match="is imported and cannot be repeated"):
         rerun_trial(str(archive), "2", tmp_path / "r")
     capsys.readouterr()
     trials = open_run(archive).trials

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSI
 LONG = SEA.replace("cycles = 1\n", "cycles = 2\nrepeat = 1000\n", 1)
 ENDED = r"interrupted \(stopped by Ctrl-C\): .*|campaign: interrupted"
 """What the last line says when the program ended in order."""
-LEFT = rf"{ENDED}|stopped at once; .*|left at once; .*"
+LEFT = rf"{ENDED}|stopped at once; .*"
 
 
 MAIN = """

@@ -141,7 +141,7 @@ def test_samples_are_those_at_home_and_a_worker_of_another_version_is_refused(
     write(tmp_path, PROTOCOL)
     done = campaign(tmp_path, "run", "protocol.toml", "--executor", site.address)
     assert "is not used: it has campaign 0.0.9, here it is " in " ".join(done.err.split())
-    assert "2 trials, or blocks of them, at once" in " ".join(done.err.split())
+    assert "2 parallel trials or blocks of trials" in " ".join(done.err.split())
     assert_equal(tmp_path, at_home)
 
 

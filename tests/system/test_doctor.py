@@ -35,7 +35,7 @@ def test_a_library_that_is_too_old_or_not_there_is_wrong(
 ) -> None:
     asked(monkeypatch, "numpy>=999", "nobody-has-this>=1", "scipy>=1")
     found = told(capsys, ExitCode.USAGE)
-    assert found["numpy"][1:] == ("wrong", "asked for is >=999: pip install 'numpy>=999'")
+    assert found["numpy"][1:] == ("wrong", "required is >=999: pip install 'numpy>=999'")
     assert found["nobody-has-this"][:2] == ("absent", "wrong")
     assert found["scipy"][1] == "fine"
 

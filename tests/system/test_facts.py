@@ -121,7 +121,7 @@ def test_other_commands_take_it_or_say_what_they_miss(folder: Path) -> None:
     campaign(folder, "fingerprint", "stated.toml")
     assert "fingerprint" in written.read_text(encoding="utf-8")
     told = campaign(folder, "init", "new", "--bench", "bare.toml", code=2).err
-    assert "no velocity-map fits it" in told
+    assert "no velocity-map test suits it" in told
     assert "limits" in told
     assert not (folder / "new").exists()
     # Limits are all that it takes; what can be executed is by hand, and says so.

@@ -98,7 +98,7 @@ def test_report_and_identify_take_the_newest_run_when_none_is_named(tmp_path: Pa
     page = campaign(tmp_path, "report").last_line
     assert page == str(Path(newest).with_suffix("")) + "-report/report.html"
     refused = campaign(tmp_path, "identify", "--model", "ramps", code=6).err
-    assert f"{Path(newest).stem}: nothing can be identified" in refused
+    assert f"{Path(newest).stem}: no parameter can be identified" in refused
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ def test_specimens_are_drawn_beside_a_model_with_its_parameters(tmp_path: Path) 
     [
         (("lugr",), "did you mean 'lugre'?"),
         (("gms",), "'attraction' is missing"),
-        (("dahl", "--set", "attraction=1 N m/s"), "none of these models has it: dahl"),
+        (("dahl", "--set", "attraction=1 N m/s"), "not a parameter of dahl"),
         (("dahl", "--rate", "2 N m"), "is not a unit of angular rate"),
         (("dahl", "--output", "dahl.png"), "a picture's name ends in .svg"),
         (("dahl", "--bench", "nobody"), "nobody"),

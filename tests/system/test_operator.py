@@ -79,7 +79,11 @@ def test_a_real_bench_is_asked_about_instability_first(
     test = unstable_test()
     asked(monkeypatch, [test], "yes\nyes\n", yes=False)
     told = capsys.readouterr().err
-    assert told.index("becomes unstable") < told.index("It will shake") < told.index("Is the bench")
+    assert (
+        told.index("becomes unstable")
+        < told.index("The bench will shake")
+        < told.index("Is the bench")
+    )
     assert "UNSTABLE" in told
     with pytest.raises(NotStartedError, match="nothing has moved"):
         asked(monkeypatch, [test], "no\n", yes=False)

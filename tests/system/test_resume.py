@@ -147,7 +147,7 @@ def test_a_protocol_that_is_gone_is_said_and_the_archived_plan_is_executed(lab: 
     lab.protocol.unlink()
     lab.bench.unlink()
     assert lab.resume(archive) is ExitCode.DONE
-    assert "is gone" in capsys.readouterr().err
+    assert "continuing with the archived plan" in capsys.readouterr().err
     assert [each.trial.fingerprint for each in open_run(archive).trials] == planned
 
 

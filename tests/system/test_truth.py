@@ -180,7 +180,7 @@ def test_a_trial_is_repeated_to_the_bit(archive: Path, capsys) -> None:
 
 def test_it_is_shown(archive: Path, capsys) -> None:
     show_archive(archive.stem, archive.parent, as_json=False)
-    assert "simulated in place of what is stated" in capsys.readouterr().out
+    assert "simulated in place of the stated bench" in capsys.readouterr().out
     show_archive(archive.stem, archive.parent, as_json=True)
     header = json.loads(capsys.readouterr().out)["header"]
     assert list(header["truth"]) == ["option", "plants"]
@@ -202,7 +202,7 @@ def test_an_interrupted_run_goes_on_with_its_truth(lab: Lab) -> None:
 def test_a_resume_refuses_another_truth(lab: Lab, accept: bool) -> None:
     archive = lab.interrupted()
     write(lab.folder, TRUTH.replace(ODD, "30"), "truth.toml")
-    with pytest.raises(UsageError, match="begun with another truth"):
+    with pytest.raises(UsageError, match="started with another truth"):
         lab.resume(archive, accept=accept)
     write(lab.folder, TRUTH, "truth.toml")
     assert lab.resume(archive) is ExitCode.DONE
@@ -230,7 +230,7 @@ def test_a_replay_answers_the_same_truth_only(lab: Lab) -> None:
 
 
 def test_a_rig_has_its_own_truth(lab: Lab) -> None:
-    with pytest.raises(UsageError, match="has a truth, and only a simulation"):
+    with pytest.raises(UsageError, match="states a truth, which only a simulation"):
         lab.run("serial", "backend.port=/dev/null")
 
 

@@ -19,7 +19,7 @@ def test_a_new_stop_on_an_old_controller_says_that_it_is_not_latched(tmp_path: P
     with OldController() as old:
         done = campaign(tmp_path, "stop", "--port", old.port)
     assert done.out == "safe now, not latched\n"
-    assert "switch it on again" in done.err
+    assert "switch the drive on again" in done.err
     assert old.stops > 1
 
 

@@ -227,7 +227,7 @@ def _report(archive: Path, folder: Path) -> Said:
             assert digest in files[name]  # of the file as it is: it differs by any flip
             files[name] = files[name].replace(digest, b"")
         told = told and bool(json.loads(numbers)["damaged"])
-        if "kept as it is" not in done.stderr:  # results of before the damage
+        if "not changed: it was made" not in done.stderr:  # results of before the damage
             root = open_run(archive).identity
             told = told and bool(read_results(results_path(archive), root).damaged)
         told = told and b"damage-heading" in page and b"tables/damaged.csv" in _names(files)

@@ -38,7 +38,7 @@ def test_what_is_declared_comes_first_and_the_rest_says_what_would_be_seen(runs:
     assert "Breakaway torque" in out
     assert "N·m per month" in out
     table = [line.split("\t") for line in out.splitlines() if "\t" in line]
-    assert table[0] == ["no trend shown", "seen from, per month", "jump seen from"]
+    assert table[0] == ["no significant trend", "detectable, per month", "detectable jump"]
     assert all("N·m/rad" in row[1] for row in table[1:])
 
 

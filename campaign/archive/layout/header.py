@@ -50,40 +50,40 @@ class _Record(BaseModel):
 
 
 class Truth(_Record):
-    """What was simulated in place of the stated benches; nothing that an analysis is given."""
+    """Plants simulated in place of the stated benches; analyses do not receive them."""
 
     option: str = ""
-    """The file that `--truth` named, absolute; empty where tests name theirs."""
+    """File of `--truth`, absolute; empty if tests name their own."""
     sources: dict[str, str] = {}
-    """Verbatim text of every truth, by its name as written."""
+    """Verbatim text of each truth, by its name as written."""
     plants: dict[str, Tree] = {}
-    """What a trial's samples were simulated with, by the digest that is the trial's `truth`: a
-    bench without controller, compensation and limits, SI."""
+    """Simulated plants by digest, which is the `truth` of a trial: benches without controller,
+    compensation and limits, SI."""
 
 
 class RunHeader(_Record):
-    """What is known about a run before its first trial. All of it is archived."""
+    """Facts of a run, known before its first trial. All are archived."""
 
     name: Annotated[str, AfterValidator(_run_name)]
     """The run's name, unique in its results folder: see `naming`."""
     created: Timestamp
-    """When the run began, ISO 8601 with a time zone."""
+    """Start of the run, ISO 8601 with a time zone."""
     title: str = ""
     description: str = ""
     protocol_name: str = ""
-    """What people call the protocol, e.g. `quickstart`."""
+    """Name of the protocol, e.g. `quickstart`."""
     protocol_path: str = ""
-    """The protocol's file, absolute: from there a resume makes the plan again."""
+    """The protocol's file, absolute: a resume makes the plan from it again."""
     sources: dict[str, str] = {}
-    """Protocol, included protocols and benches, verbatim, by the path the protocol names them."""
+    """Protocol, included protocols and benches, verbatim, by their path in the protocol."""
     truth: Truth = Truth()
-    """What was simulated in place of the stated benches, where that is something else."""
+    """Plants simulated in place of the stated benches, if any."""
     normalised: Tree = {}
     """The protocol after validation: SI, defaults filled in, includes and benches resolved."""
     tests: tuple[Tree, ...] = ()
-    """Per test: name, kind, title, description, what it reproduces, normalised options ..."""
+    """Per test: name, kind, title, description, `reproduces`, normalized options ..."""
     trials: int = Field(default=0, ge=0)
-    """How many trials are planned."""
+    """Number of planned trials."""
     versions: dict[str, str] = {}
     """Python, this program and the libraries that made the samples."""
     plugins: tuple[Tree, ...] = ()
@@ -97,18 +97,18 @@ class RunHeader(_Record):
     tags: tuple[str, ...] = ()
     backend: str = ""
     source: str = ""
-    """Where the backend's samples come from: `simulation`, `hardware` or `recording`."""
+    """Source of the backend's samples: `simulation`, `hardware` or `recording`."""
     backend_options: Tree = {}
     overrides: dict[str, str] = {}
-    """What `--set` changed, dotted path to value as written."""
+    """Changes by `--set`, dotted path to value as written."""
     only: tuple[str, ...] = ()
-    """The tests that `--only` chose; empty for all."""
+    """Tests selected by `--only`; empty for all."""
     git_revision: str = ""
-    """Revision of the working tree the protocol lies in, where there is one."""
+    """Revision of the protocol's working tree, if any."""
     seed: int | None = None
-    """From which the tests without a seed of their own got theirs."""
+    """Run seed; tests without a seed of their own derive theirs from it."""
     fingerprint: str = ""
-    """SHA-256 of the normalised protocol in canonical JSON."""
+    """SHA-256 of the normalized protocol in canonical JSON."""
 
 
 class PlannedTrial(_Record):

@@ -57,9 +57,9 @@ class RunStarted(_Line):
 
 
 class RunResumed(_Line):
-    """Somebody goes on with a run that was interrupted or killed; what follows is theirs.
+    """Resume of an interrupted or killed run; later lines belong to it.
 
-    `changes` are the differences to what the run began with, as they were shown and accepted.
+    `changes`: accepted differences from the conditions at the start of the run.
     """
 
     event: Literal["run resumed"] = "run resumed"
@@ -71,7 +71,7 @@ class RunResumed(_Line):
 
 
 class OperatorStep(_Line):
-    """A person was asked to do something to the bench, and what they answered."""
+    """Manual step of the operator at the bench, and the answer."""
 
     event: Literal["operator step"] = "operator step"
     at: str
@@ -81,7 +81,7 @@ class OperatorStep(_Line):
 
 
 class Decision(_Line):
-    """What the run did besides its plan: a retry, a skipped trial, an abort, a rest ..."""
+    """Deviation from the plan: a retry, a skipped trial, an abort, a rest ..."""
 
     event: Literal["decision"] = "decision"
     at: str
@@ -91,26 +91,26 @@ class Decision(_Line):
 
 
 class FollowedTrial(PlannedTrial):
-    """A trial of a stage: its line of the plan, and all of it as in `plan-trials.jsonl`."""
+    """A trial of a stage: its line of the plan, and its tree as in `plan-trials.jsonl`."""
 
     trial: Tree
 
 
 class TrialRefused(_Line):
-    """A trial of a stage that may not be executed, and why."""
+    """A trial of a stage that must not be executed, and the reason."""
 
     label: str
     why: str
 
 
 class TrialsFollowed(_Line):
-    """A stage of a test was asked, at one point of its matrix, which trials follow.
+    """Trials of a stage of a test, at one point of its matrix.
 
     Attributes:
-        stage: its number; 1 are the planned trials.
-        trials: those that are executed, numbered after all that were known before.
+        stage: its number; the planned trials are stage 1.
+        trials: accepted trials, numbered after all earlier ones.
         trees: benches and options that they name, by digest.
-        reason: why there are none, where the stage itself failed.
+        reason: reason for no trials, if the stage itself failed.
     """
 
     event: Literal["trials followed"] = "trials followed"
@@ -132,7 +132,7 @@ class TrialsFollowed(_Line):
 
 
 class TrialFinished(_Line):
-    """A trial ended, however it ended, and its file is on the disk under its real name.
+    """A trial ended, with any outcome, and its file is on the disk under its final name.
 
     `record` is the digest of the trial's record.
     """
@@ -151,12 +151,12 @@ class TrialFinished(_Line):
 
 
 class TrialMeasured(_Line):
-    """What a recording says by itself, found once its trial was on the disk.
+    """Metrics of a recording, computed after its trial was written to the disk.
 
     Attributes:
-        record: digest of the trial's record, which names the samples: of them it is said.
-        by: which code found it, with its version.
-        estimates: each finite, and of another name than the others.
+        record: digest of the trial's record, which identifies the measured samples.
+        by: code that computed the metrics, with its version.
+        estimates: finite, with different names.
     """
 
     event: Literal["trial measured"] = "trial measured"
@@ -174,7 +174,7 @@ class TrialMeasured(_Line):
 
 
 class TrialAbandoned(_Line):
-    """A trial was begun and nothing of it is kept."""
+    """A trial was started and nothing of it is kept."""
 
     event: Literal["trial abandoned"] = "trial abandoned"
     at: str
@@ -183,7 +183,7 @@ class TrialAbandoned(_Line):
 
 
 class RunEnded(_Line):
-    """The run was closed and is being, or has been, sealed; only a resume may follow."""
+    """The run is closed, and sealed now or soon; only a resume may follow."""
 
     event: Literal["run ended"] = "run ended"
     at: str

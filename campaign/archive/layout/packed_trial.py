@@ -19,7 +19,7 @@ Place = tuple[NonNegativeInt, NonNegativeInt]
 
 
 class PackedSeries(BaseModel):
-    """Where the samples of a series lie.
+    """Places of the samples of a series.
 
     Attributes:
         chunk: samples of a chunk; zeros follow the last samples of the last one.
@@ -36,11 +36,11 @@ class PackedSeries(BaseModel):
 
 
 class PackedTrial(BaseModel):
-    """A trial as its file has it.
+    """A trial in its file.
 
     Attributes:
         record, trees: texts, as in a sealed run.
-        not_kept: why only digests of its samples were kept; empty when the samples are there.
+        not_kept: why only digests of its samples are kept; empty if the samples are.
         groups: `data`, and `preview` of a long recording.
     """
 

@@ -44,7 +44,7 @@ class _Part(BaseModel):
 
 
 class SeriesRecord(_Part):
-    """A recorded channel: what there is to say of it, and the digest of its samples."""
+    """A recorded channel: its description, and the digest of its samples."""
 
     name: str
     unit: str
@@ -75,26 +75,26 @@ class PreviewRecord(_Part):
 
 
 class EventRecord(_Part):
-    """Something that happened, at the trial's own time (s)."""
+    """An event, at the time of the trial (s)."""
 
     time: float
     text: str
 
 
 class TrialRecord(_Part):
-    """A trial as it was executed.
+    """An executed trial.
 
     Attributes:
         trial: the resolved trial, with the digest of a tree in place of each of `SHARED`.
-        label: of the trial, for people.
-        fingerprint: `Trial.fingerprint`, when it was executed.
-        attempt: how often the trial had been executed with this one, from 1.
+        label: of the trial, for readers.
+        fingerprint: `Trial.fingerprint` at the time of execution.
+        attempt: number of this execution of the trial, from 1.
         started, ended: ISO 8601.
-        samples: length of every series; None when no channel was announced.
+        samples: length of each series; None if no channel was announced.
         time: digest of the time base.
-        windows: parts that an analysis uses, where they are not the one in `trial`.
-        estimates: numbers that were found while it ran, each with its interval.
-        measured_by: which code found them, with its version.
+        windows: parts that an analysis uses, if they differ from the one in `trial`.
+        estimates: numbers computed during the trial, each with its interval.
+        measured_by: code that computed them, with its version.
     """
 
     trial: Tree

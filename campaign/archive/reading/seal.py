@@ -34,7 +34,7 @@ NUMBERS = ("outcome/trials_finished", "outcome/trials_failed", "provenance/forma
 
 
 class Seal(BaseModel):
-    """The digests of a run's texts by their place in `/run`; of a number, those of its digits."""
+    """Digests of a run's texts by their place in `/run`; for a number, of its digits."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 

@@ -39,18 +39,18 @@ ENOUGH = 4
 
 @dataclass(frozen=True)
 class Answer:
-    """What one test comes to.
+    """Summary of one test.
 
     Attributes:
         where: conditions that all of its key numbers share.
         numbers: its key numbers, the most important first.
-        figure: the key of its most telling figure.
-        remarks: what the numbers do not say: no interval, or not all of it.
-        truth: how many intervals hold what is true of the bench that was simulated, and what is
-            off alike in all of them; "" unknown.
-        prediction: which numbers are not what its bench file states any more; "" untested.
-        references: the same of each file of reference values.
-        problem: why there is no number, or not all of them.
+        figure: the key of its leading figure.
+        remarks: missing or incomplete intervals of the numbers.
+        truth: count of intervals that contain the true value of the simulated bench, and biases;
+            "" if unknown.
+        prediction: numbers that differ from its bench file; "" if untested.
+        references: the same for each file of reference values.
+        problem: why some or all numbers are missing.
     """
 
     test: str
@@ -67,17 +67,17 @@ class Answer:
 
 @dataclass(frozen=True)
 class FirstScreen:
-    """What stands on top of the page.
+    """Top of the page.
 
     Attributes:
         answers: per test, in the protocol's order.
-        main: of many tests, those whose numbers stand on top; empty where all answers do.
-        telling: test and key of the one figure that is shown there; None without any.
-        wrong: sentences on what went wrong: failed, interrupted, damaged, not analysed.
-        asked: what was executed, on which bench, in a sentence.
-        compared: how many published values were reproduced; "" where none was compared.
-        intervals: what ± and brackets say; "" where no number has any.
-        held: how many intervals of all tests hold the true values; "" unknown.
+        main: of many tests, those with their numbers on top; empty if all answers are.
+        telling: test and key of the leading figure; None without any.
+        wrong: sentences on problems: failed, interrupted, damaged, not analyzed.
+        asked: sentence on the executed tests and trials and their bench.
+        compared: count of reproduced published values; "" if none was compared.
+        intervals: meaning of ± and brackets; "" if no number has any.
+        held: count of intervals of all tests that contain the true value; "" if unknown.
     """
 
     answers: tuple[Answer, ...]

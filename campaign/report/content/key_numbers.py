@@ -25,16 +25,16 @@ from campaign.units import convert
 
 @dataclass(frozen=True)
 class KeyNumber:
-    """A key number of a test, as a reader is shown it.
+    """A key number of a test, as text.
 
     Attributes:
         quantity: in words.
-        where: its conditions, but for those that it shares with the others of its test.
+        where: its conditions, without those that all key numbers of the test share.
         value: with its interval and unit.
-        published: what is printed of it, with its unit; "" where nothing is.
-        agrees: whether that is reproduced.
-        true: what is true of the simulated bench, with its unit, and whether it lies outside of
-            the interval; "" unknown.
+        published: the published value with its unit; "" without one.
+        agrees: whether the published value is reproduced.
+        true: true value of the simulated bench with its unit, and whether it is outside the
+            interval; "" if unknown.
     """
 
     quantity: str

@@ -1,7 +1,7 @@
-"""The data of `report.json`: every number unrounded.
+"""Data of `report.json`, with unrounded numbers.
 
 The JSON Schema in `docs/report.schema.json` is made from these; `docs/results-as-data.md` explains.
-Numbers are SI unless something else is said; one that is not finite is null.
+Numbers are SI unless stated otherwise; a number that is not finite is null.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, JsonValue
 from campaign.report.content.first_screen import FirstScreen
 
 FORMAT = 3
-"""Rises when a field changes its meaning or goes; a new one may come at any time."""
+"""Increases if a field changes its meaning or is removed, not if one is added."""
 
 
 class _Part(BaseModel):
@@ -19,49 +19,49 @@ class _Part(BaseModel):
 
 
 class Number(_Part):
-    """A number that was found, or why it was not."""
+    """A number, or the reason for its absence."""
 
     quantity: str
-    """What it is, e.g. `coulomb_torque`."""
+    """Its name, e.g. `coulomb_torque`."""
     value: float | None
-    """SI, in `unit`; null when it is not determined."""
+    """SI, in `unit`; null if not determined."""
     unit: str
     low: float | None
-    """Lower end of the interval as the page shows it, systematic parts included; null where it is
-    open or there is none. Of a bound, the only end there is."""
+    """Lower end of the interval on the page, systematic parts included; null if open or absent. A
+    bound has only one end."""
     high: float | None
-    """Its upper end."""
+    """Upper end."""
     scatter_low: float | None
-    """Lower end of the interval that scatter alone leaves."""
+    """Lower end of the interval from scatter alone."""
     scatter_high: float | None
     level: float | None
-    """The share of repetitions in which such an interval holds the truth."""
+    """Share of repetitions whose interval contains the true value."""
     standard_error: float | None
     """One sigma."""
     freedom: float | None
-    """Degrees of freedom behind it."""
+    """Degrees of freedom."""
     origin: str
     """`measured`, `assumed`, `given`, `at its bound` or `not determined`."""
     kind: str
     """`number`, `share`, `count`, `quantile`, `at least` or `at most`."""
     reason: str
-    """Why it has no interval, or no value."""
+    """Reason for no interval or no value."""
     reason_code: str
-    """Which reason that is: the same for all of its kind; "" for none."""
+    """Code of the reason, equal for all of its kind; "" for none."""
     reason_values: dict[str, JsonValue]
-    """What `reason` has in it, by name (SI, or a percentage called so)."""
+    """Values in `reason` by name (SI, or a percentage named so)."""
     method: str
     systematic: dict[str, float | None]
-    """What repetitions do not show: source to standard uncertainty, null where nobody knows it."""
+    """Not visible in repetitions: source to standard uncertainty; null if unknown."""
 
 
 class Finding(_Part):
-    """A number that a test found, under its conditions (SI)."""
+    """A result of a test, with its conditions (SI)."""
 
     number: Number
     conditions: dict[str, JsonValue]
     recomputed: bool
-    """Derived from other published numbers rather than from a recording."""
+    """Derived from other published numbers, not from a recording."""
 
 
 class Column(_Part):
@@ -70,19 +70,19 @@ class Column(_Part):
     name: str
     label: str
     unit: str
-    """Of the numbers here (SI)."""
+    """Unit of its values (SI)."""
     display: str
     """Unit on the page, and in the CSV file."""
     factor: float
-    """What a number here is multiplied by to be in `display`."""
+    """Converts its values from `unit` to `display`."""
     exact: bool
-    """What it holds was set or counted."""
+    """Its values were set or counted."""
     reason: str
-    """Why its numbers have no interval."""
+    """Why its values have no interval."""
 
 
 class Table(_Part):
-    """A table of the page; rows have a value, or a number with its interval, by column."""
+    """A table of the page; a row has a value, or a number with interval, by column."""
 
     key: str
     title: str
@@ -93,15 +93,15 @@ class Table(_Part):
     """The CSV file."""
     note: str
     remarks: tuple[str, ...]
-    """Which of its numbers have no interval or are not determined, and why."""
+    """Numbers without an interval or value, with reasons."""
     published: tuple[str, ...]
-    """Published tables it stands for."""
+    """Corresponding published tables."""
     columns: tuple[Column, ...]
     rows: tuple[dict[str, Number | float | int | str | bool | None], ...]
 
 
 class Axis(_Part):
-    """An axis: `unit` is that of the numbers here (SI), `display` that of the drawing."""
+    """An axis: `unit` of the values (SI), `display` of the drawing."""
 
     label: str
     unit: str
@@ -112,21 +112,21 @@ class Axis(_Part):
 
 
 class Curve(_Part):
-    """A curve as it is drawn: all of its points, or so many that the picture is the same."""
+    """A curve as drawn: all points, or enough for the same picture."""
 
     label: str
     series: str
     style: str
     points: int
-    """How many it has; all are in `RUN-results.nxs`."""
+    """Number of its points; all are in `RUN-results.nxs`."""
     x: tuple[float | None, ...]
-    """Seven digits, as are all numbers of a curve."""
+    """Seven digits, as all numbers of a curve."""
     y: tuple[float | None, ...]
     low: tuple[float | None, ...] | None
     """Lower end of the 95 % interval of y."""
     high: tuple[float | None, ...] | None
     lower_edge: tuple[float | None, ...] | None
-    """Of a band, whose upper edge is y."""
+    """Lower edge of a band; y is the upper."""
 
 
 class Mark(_Part):
@@ -161,13 +161,13 @@ class Figure(_Part):
     caption: str
     published: tuple[str, ...]
     trials: tuple[int, ...]
-    """Those that it shows, as the page says; empty where it says none."""
+    """Shown trials, as stated on the page; empty if not stated."""
     panels: tuple[Panel, ...]
-    """Empty for a picture of what is in `scoreboard`, `prediction` or `references`."""
+    """Empty for a figure of `scoreboard`, `prediction` or `references`."""
 
 
 class Comparison(_Part):
-    """A published table beside what was found: the lines of the scoreboard with its name."""
+    """A published table beside the results: the lines of the scoreboard with its name."""
 
     table: str
     heading: str
@@ -178,14 +178,14 @@ class Comparison(_Part):
 
 
 class Said(_Part):
-    """A fact as the page says it."""
+    """A fact as on the page."""
 
     name: str
     text: str
 
 
 class Test(_Part):
-    """One test: what it is, what it comes to, and all that it found."""
+    """One test: description, key numbers and all results."""
 
     __test__ = False  # it is not one of pytest's
 
@@ -197,43 +197,43 @@ class Test(_Part):
     reproduces: tuple[str, ...]
     problems: tuple[str, ...]
     trials: tuple[int, ...]
-    """The executed ones that could be read."""
+    """Executed trials that are readable."""
     options: dict[str, JsonValue]
-    """Normalised (SI), before the sweep."""
+    """Normalized (SI), before the sweep."""
     conditions: tuple[Said, ...]
     key_numbers: tuple[Finding, ...]
-    """What was asked for, the most important first: `findings`, or medians of draws."""
+    """Requested results, the most important first: `findings`, or medians of draws."""
     notes: tuple[str, ...]
     findings: tuple[Finding, ...]
     comparisons: tuple[Comparison, ...]
     figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
     truth: Table | None
-    """What it found beside what is true, where that is known."""
+    """Its results beside the true values, if known."""
     prediction: Table | None
-    """What it found beside what its bench file states, where that is tested."""
+    """Its results beside the values of its bench file, if tested."""
     references: tuple[Table, ...]
-    """What it found beside each file of reference values."""
+    """Its results beside each file of reference values."""
 
 
 class Line(_Part):
-    """A published number beside what was found, both in the unit that it is printed in."""
+    """A published number beside the result, both in the printed unit."""
 
     table: str
     row: str
     column: str
     cell: str
-    """The same in words."""
+    """Row and column in words."""
     unit: str
     published: float | None
     printed: str
     relation: str
-    """`equal`, `near`, `at most`, `at least` or `rank`: what the document claims."""
+    """`equal`, `near`, `at most`, `at least` or `rank`: claim of the document."""
     reproduced: float | None
     low: float | None
     high: float | None
     kind: str
-    """Of what was found; `at least` and `at most` are bounds. "" where nothing was."""
+    """Of the result; `at least` and `at most` are bounds. "" without a result."""
     deviation_percent: float | None
     verdict: str
     status: str
@@ -241,25 +241,25 @@ class Line(_Part):
     source: str
     notes: tuple[str, ...]
     draws: tuple[float | None, ...]
-    """What each draw of a random bench found."""
+    """Result of each draw of a random bench."""
     place: Number | None
-    """The share of the draws that lie below the published number."""
+    """Share of the draws below the published number."""
 
 
 class Count(_Part):
-    """How many published numbers of one status were compared, and how many hold."""
+    """Counts of compared and of reproduced published numbers of one status."""
 
     status: str
     compared: int
     good: int
     numbers: int
-    """Of which a deviation in percent means something."""
+    """Count of those with a deviation in percent."""
     within_percent: dict[str, int]
-    """How many of these deviate by no more than so many percent."""
+    """Count of these by largest deviation in percent."""
 
 
 class Contradiction(_Part):
-    """Cells of a published table that cannot all be right."""
+    """Cells of a published table that cannot all be correct."""
 
     table: str
     cells: tuple[str, ...]
@@ -267,27 +267,27 @@ class Contradiction(_Part):
 
 
 class Scoreboard(_Part):
-    """Published values beside what was found; `further` were found again and do not count."""
+    """Published values beside the results; `further` are repeated results and do not count."""
 
     agreement: str
-    """What it all comes to, in words."""
+    """Summary in words."""
     counts: tuple[Count, ...]
-    """Each published number once, however often it is printed."""
+    """Each published number counts once, also if printed several times."""
     closeness: Table | None
-    """The counts as the page shows them."""
+    """The counts as on the page."""
     not_reached: int
     not_found: int
     not_run: int
     lines: tuple[Line, ...]
     further: tuple[Line, ...]
     statuses: dict[str, int]
-    """How many lines have which status."""
+    """Number of lines by status."""
     sources: tuple[str, ...]
     altered: tuple[str, ...]
     contradictions: tuple[Contradiction, ...]
     figures: tuple[Figure, ...]
     file: str
-    """The CSV file; "" without any lines."""
+    """The CSV file; "" without lines."""
 
 
 class FailedTrial(_Part):
@@ -301,7 +301,7 @@ class FailedTrial(_Part):
 
 
 class Run(_Part):
-    """The run that the report is of."""
+    """The run of the report."""
 
     name: str
     file: str
@@ -325,46 +325,46 @@ class Run(_Part):
 
 
 class Provenance(_Part):
-    """What the run is, and what this was made by, in digests and versions."""
+    """Digests and versions of the run and of the report's program."""
 
     sha256: str
-    """Of the archive's file as `sha256sum` prints it; of a run in progress, of its journal."""
+    """Of the archive file, as by `sha256sum`; for a run in progress, of its journal."""
     seal: str
-    """The digest that stands for all of the run; "" where there is none."""
+    """Digest of the whole run; "" without a seal."""
     fingerprint: str
-    """Of the normalised protocol."""
+    """Of the normalized protocol."""
     command: str
-    """What repeats the run."""
+    """Command that repeats the run."""
     seeds: str
     git_revision: str
     backend_options: dict[str, JsonValue]
     overrides: dict[str, str]
     only: tuple[str, ...]
     versions: dict[str, str]
-    """When it was executed."""
+    """At the time of execution."""
     plugins: tuple[dict[str, JsonValue], ...]
     host: dict[str, str]
     measured_by: str
     truths: tuple[str, ...]
-    """Names of the benches that were simulated in place of the stated ones."""
+    """Names of the benches simulated in place of the stated ones."""
     sources: dict[str, str]
     """Protocol and benches, verbatim."""
     truth_sources: dict[str, str]
     program: str
     """The version of campaign that made the report."""
     code: str
-    """Hash of the sources that analysed."""
+    """Hash of the sources of the analysis."""
 
 
 class Incidents(_Part):
-    """What happened besides the plan."""
+    """Deviations from the plan."""
 
     figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
 
 
 class Section(_Part):
-    """A section of a page that is no report."""
+    """A section of a page other than a report."""
 
     anchor: str
     heading: str
@@ -384,7 +384,7 @@ class ArticleData(_Part):
     facts: tuple[tuple[Said, ...], ...]
     sections: tuple[Section, ...]
     content: dict[str, JsonValue]
-    """What only this kind of page has."""
+    """Data of this kind of page only."""
 
 
 class ReportData(_Part):
@@ -393,7 +393,7 @@ class ReportData(_Part):
     format: int = FORMAT
     run: Run
     opening: FirstScreen
-    """As on top of the page; its numbers are in the tests' `key_numbers`."""
+    """Top of the page; its numbers are in the tests' `key_numbers`."""
     scoreboard: Scoreboard
     tests: tuple[Test, ...]
     incidents: Incidents
