@@ -6,7 +6,7 @@ are parabolas over each step (exponential collocation at the ends and the middle
 Hochbruck and Ostermann, Acta Numerica 19, 2010, section 2). Between samples the torque is a spline.
 
 Checked against Radau at a tolerance of 1e-9: with the step of `steps_per_sample` the rate is within
-1e-4 of its largest value (tests/identification).
+1e-4 of its largest value (tests/estimation/test_presliding_dynamics.py).
 """
 
 from __future__ import annotations
