@@ -1,10 +1,10 @@
-"""Torque that depends on the angle, as gravity does, from steady stretches.
+"""Torque that depends on the angle, such as gravity, from steady stretches.
 
-Within a stretch at one speed friction is steady, but for a drift in time as of warming up. What
-changes there with the angle, in all stretches alike, is none of it; each stretch keeps a level of
-its own, so that no friction goes into the harmonics, whatever it is at which speed. Friction that
-drifts changes with the angle as well, as the axis goes on turning: a drift of the force and one of
-the friction, each a parabola in time, stand beside the harmonics, which get what these leave.
+Within a stretch at one speed friction is constant, except for a drift in time, such as by warming.
+A change with the angle that is common to all stretches is not friction. Each stretch has its own
+level, so that friction at any speed has no effect on the harmonics. Friction that drifts also
+changes with the angle, because the axis turns. Therefore the fit includes a drift of the force and
+one of the friction, each a parabola in time, together with the harmonics.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import numpy as np
 from campaign.arrays import Array
 
 FEWEST = 10
-"""stretches."""
+"""Fewest stretches."""
 BLOCKS = 50
-"""means of a stretch at most: long ones do not count for more."""
+"""Most block means of a stretch, so that long stretches do not dominate."""
 SHARE = 0.1
-"""of what changes within stretches that the angle explains, at least; the rest may be noise."""
+"""Least share of the variation within stretches that the angle explains; the rest may be noise."""
 SURE = 5.0
-"""Deviations by which the largest harmonic differs from zero, at least."""
+"""Least size of the largest harmonic, in deviations."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class OverATurn:
 
     Attributes:
         values: of sin q, cos q, sin 2q ... (N m), shape (2 k,).
-        covariance: of them, with stretches as draws, shape (2 k, 2 k).
-        share: of what changes within stretches, and does not drift, that they explain.
+        covariance: of the values, with stretches as samples, shape (2 k, 2 k).
+        share: explained share of the variation within stretches, without drift.
     """
 
     values: Array
@@ -42,39 +42,39 @@ class OverATurn:
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
-        """Of each harmonic (N m)."""
+        """Amplitude of each harmonic (N m)."""
         return tuple(float(each) for each in np.hypot(self.values[::2], self.values[1::2]))
 
     def at(self, angle: Array) -> Array:
-        """The torque at angles (rad), shape (n,)."""
+        """Torque at angles (rad), shape (n,)."""
         return np.asarray(_basis(angle, len(self.amplitudes)) @ self.values)
 
     def doubts(self, angle: Array) -> Array:
-        """Means over angles (rad), shape (n,), of what it may be off by: 1 sigma, shape (2 k,).
+        """Errors of the mean over angles (rad), shape (n,): 1 sigma, shape (2 k,).
 
-        Independent of each other, and each shared by all stretches.
+        Independent of each other, and each common to all stretches.
         """
-        sizes, ways = np.linalg.eigh(self.covariance)
+        sizes, modes = np.linalg.eigh(self.covariance)
         mean = _basis(angle, len(self.amplitudes)).mean(axis=0)
-        return np.asarray(mean @ ways * np.sqrt(np.maximum(sizes, 0.0)))
+        return np.asarray(mean @ modes * np.sqrt(np.maximum(sizes, 0.0)))
 
 
 def over_a_turn(stretches: Sequence[tuple[Array, Array, Array]]) -> OverATurn | None:
-    """From time (s), angle (rad) and torque (N m) of each stretch, shape (n,) each.
+    """Harmonics from time (s), angle (rad) and torque (N m) of each stretch, shape (n,) each.
 
-    None where little goes with the angle, or where it cannot be told from a drift.
+    None for few stretches, a small effect of the angle, or one that may be a drift.
     """
     if len(stretches) < FEWEST:
         return None
     means = [tuple(_blocks(each) for each in parts) for parts in stretches]
     first, second = _fitted(means, 1), _fitted(means, 2)
-    # Schwarz' criterion, with stretches as draws.
+    # Schwarz' criterion, with stretches as samples.
     gain = (1.0 - first.share) / max(1.0 - second.share, 1e-12)
-    found = second if len(means) * np.log(gain) > 2.0 * np.log(len(means)) else first
-    error = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
-    largest = int(np.argmax(np.abs(found.values)))
-    sure = abs(found.values[largest]) > SURE * error[largest]
-    return found if found.share > SHARE and sure else None
+    turn = second if len(means) * np.log(gain) > 2.0 * np.log(len(means)) else first
+    error = np.sqrt(np.maximum(np.diag(turn.covariance), 0.0))
+    largest = int(np.argmax(np.abs(turn.values)))
+    sure = abs(turn.values[largest]) > SURE * error[largest]
+    return turn if turn.share > SHARE and sure else None
 
 
 def _blocks(values: Array) -> Array:
@@ -107,14 +107,16 @@ def _fitted(means: Sequence[tuple[Array, ...]], harmonics: int) -> OverATurn:
 
 
 def _score(basis: Array, torque: Array, inverse: Array, values: Array) -> Array:
-    """Of one stretch, by what it leaves of the fit to all others (jackknife; Bell and McCaffrey,
-    Survey Methodology 28 (2002) 169): a few long strokes decide, and the fit follows them.
+    """Score of one stretch, by its residuals of the fit to all others.
+
+    Jackknife (Bell and McCaffrey, Survey Methodology 28 (2002) 169), because the fit follows a few
+    long strokes.
     """
     kept = np.eye(len(torque)) - basis @ inverse @ basis.T
     return np.asarray(basis.T @ np.linalg.lstsq(kept, torque - basis @ values, rcond=1e-9)[0])
 
 
 def _drift(time: Array, angle: Array) -> Array:
-    """Of the force, and of a friction that acts against the motion, shape (n, 4)."""
-    way = np.sign(angle[-1] - angle[0])
-    return np.stack([time, time**2, way * time, way * time**2], axis=1)
+    """Columns of the drift of force and of friction against the motion, shape (n, 4)."""
+    sign = np.sign(angle[-1] - angle[0])
+    return np.stack([time, time**2, sign * time, sign * time**2], axis=1)

@@ -1,7 +1,7 @@
 """Standard errors of least-squares fits with autocorrelated residuals.
 
-A sensor's noise is seldom white. Ordinary least squares then gives the right values and standard
-errors that are too small: an AR(1) residual with coefficient 0.8 makes them three times too small.
+Sensor noise is seldom white. Then ordinary least squares has no bias, but its standard errors are
+too small: three times with AR(1) residuals of coefficient 0.8.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ import numpy as np
 from campaign.arrays import Array
 
 COEFFICIENTS = np.linspace(0.0, 0.95, 20)
-"""Of AR(1) that are tried; residuals that avoid their neighbours count as white."""
+"""AR(1) coefficients of the search; negatively correlated residuals count as white."""
 MOST_AT_ONCE = 1 << 18
-"""Numbers of whitened designs that are in memory together."""
+"""Most elements of whitened designs in memory at the same time."""
 MISFIT = 1.5
-"""Residual variance over what neighbouring residuals differ by, above which what is left over is
-the model's own error: no interval can be built on it."""
+"""Residual variance over that between neighbors, above which the residuals are the model's own
+error, and no interval is valid."""
 
 
 @dataclass(frozen=True)
 class FitErrors:
-    """What the residuals of a fit say of its parameters.
+    """Errors of the parameters of a fit, from its residuals.
 
     Attributes:
         covariance: of the parameters, shape (k, k).
         freedom: residuals less parameters.
         correlation: AR(1) coefficient of the residuals, by restricted maximum likelihood.
-        misfit: residual variance over half the mean square of neighbours' differences (von
-            Neumann): 1 for white residuals, much more where the model misses the data.
+        misfit: residual variance over half the mean square difference of neighbors (von Neumann):
+            1 for white residuals, much more where the model does not fit the data.
     """
 
     covariance: Array
@@ -42,10 +42,9 @@ class FitErrors:
 def errors_of(jacobian: Array, residuals: Array) -> FitErrors:
     """Errors of a least-squares fit with AR(1) residuals, in order and evenly spaced.
 
-    jacobian: of the model, shape (n, k); residuals: data less model, shape (n,). The coefficient is
-    found by restricted maximum likelihood (Harville, J. Am. Stat. Assoc. 72, 1977), which does not
-    mistake the fit's own freedom for white noise. Raises ValueError when n <= k or the parameters
-    are not independent.
+    jacobian: of the model, shape (n, k); residuals: data less model, shape (n,). Restricted maximum
+    likelihood (Harville, J. Am. Stat. Assoc. 72, 1977) estimates the coefficient without the bias
+    by the fitted parameters. Raises ValueError when n <= k or the parameters are dependent.
     """
     count, parameters = jacobian.shape
     freedom = count - parameters
@@ -72,9 +71,9 @@ def errors_of(jacobian: Array, residuals: Array) -> FitErrors:
 
 
 def misfit(residuals: Array, parameters: int) -> float:
-    """Residual variance over that between neighbours: near 1, unless the model misses the data.
+    """Residual variance over that between neighbors: near 1, unless the model does not fit.
 
-    Infinite when neighbours do not differ at all.
+    Infinite when neighbors are equal.
     """
     between = 0.5 * float(np.mean(np.diff(residuals) ** 2))
     variance = float(residuals @ residuals) / max(len(residuals) - parameters, 1)
@@ -82,7 +81,7 @@ def misfit(residuals: Array, parameters: int) -> float:
 
 
 def whitened(values: Array, coefficient: float) -> Array:
-    """What is new in each of the values of an AR(1) process, shape (n,) or (n, k)."""
+    """Innovations of the values of an AR(1) process, shape (n,) or (n, k)."""
     first = np.sqrt(1.0 - coefficient**2) * values[:1]
     return np.concatenate([first, values[1:] - coefficient * values[:-1]])
 
@@ -90,8 +89,9 @@ def whitened(values: Array, coefficient: float) -> Array:
 def _likelihoods(
     design: Array, residuals: Array, coefficients: Array
 ) -> tuple[Array, Array, Array]:
-    """Restricted log likelihoods of m AR(1) coefficients, shape (m,), triangles of the whitened
-    design (m, k, k), and variances of the innovations (m,).
+    """Restricted log likelihoods of m AR(1) coefficients, shape (m,).
+
+    Also triangles of the whitened design (m, k, k), and variances of the innovations (m,).
     """
     first = np.sqrt(1.0 - coefficients**2)
     columns = np.ascontiguousarray(design.T)

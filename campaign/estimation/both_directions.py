@@ -29,10 +29,10 @@ ONE_DIRECTION = Cause("one direction", "one direction is {origin}")
 def fitted_nominal(
     positive: DirectionFit, negative: DirectionFit, model: Model
 ) -> dict[str, Estimate]:
-    """Mean of both directions, by name, as fitted; their errors are those of the same trials.
+    """Mean of both directions, by name, as fitted; their errors are correlated.
 
-    Points of one speed are of one trial, out and back. How far their errors go together is told by
-    the residuals; it was 0.73 to 0.99 where friction scatters from trial to trial.
+    Both points of one speed are from the same trial. The residuals determine the correlation; it
+    was 0.73 to 0.99 where friction scatters from trial to trial.
     """
     one, other = fitted_estimates(positive, model), fitted_estimates(negative, model)
     return {name: _mean(positive, negative, model, one[name], other[name]) for name in one}
@@ -51,22 +51,22 @@ def _mean(
     if is_bent(positive, model, name) or is_bent(negative, model, name):
         ends = np.array([[one.low, one.high], [other.low, other.high]], dtype=float)
         low, high = np.mean(ends, axis=0).tolist()
-        told = replace(one, value=value, low=low, high=high, method=TOGETHER, systematic=())
+        mean = replace(one, value=value, low=low, high=high, method=TOGETHER, systematic=())
     else:
-        told = _by_covariance(positive, negative, model, one, other)
+        mean = _by_covariance(positive, negative, model, one, other)
     parts = (positive.form_part(model, name), negative.form_part(model, name))
-    return shifted_by(told, FORM, 0.5 * sum(parts)) if any(parts) else told
+    return shifted_by(mean, FORM, 0.5 * sum(parts)) if any(parts) else mean
 
 
 def _by_covariance(
     positive: DirectionFit, negative: DirectionFit, model: Model, one: Estimate, other: Estimate
 ) -> Estimate:
     name, value = one.name, 0.5 * (one.value + other.value)
-    found = positive.fits[model], negative.fits[model]
+    fits = positive.fits[model], negative.fits[model]
     cross = cross_covariance(positive, negative, model)
-    i, j = found[0].free.index(name), found[1].free.index(name)
+    i, j = fits[0].free.index(name), fits[1].free.index(name)
     variance = 0.25 * (
-        found[0].covariance[i, i] + found[1].covariance[j, j] + 2.0 * float(cross[i, j])
+        fits[0].covariance[i, i] + fits[1].covariance[j, j] + 2.0 * float(cross[i, j])
     )
     freedom = min(positive.freedom, negative.freedom)
     method = f"mean of both directions, with the covariance of their points, t({freedom})"
@@ -76,9 +76,9 @@ def _by_covariance(
 
 
 def correlation(positive: DirectionFit, negative: DirectionFit) -> float:
-    """Of the residuals of both directions with delta free, over their deviations; -1 to 1.
+    """Correlation of the residuals of both directions, with delta free, over their deviations.
 
-    Over the speeds that both have; 1, the safe side, where these are too few to tell.
+    From the common speeds; 1, the conservative value, where these are too few.
     """
     shared = _shared(positive, negative)
     if shared is None:
@@ -94,7 +94,7 @@ def correlation(positive: DirectionFit, negative: DirectionFit) -> float:
 def cross_covariance(positive: DirectionFit, negative: DirectionFit, model: Model) -> Array:
     """Covariance of the free parameters of both directions, shape (k, l).
 
-    Points of different speeds are of different trials, and have none.
+    Points of different speeds are from different trials, and have no covariance.
     """
     one, other = positive.fits[model], negative.fits[model]
     together = correlation(positive, negative)
@@ -102,16 +102,16 @@ def cross_covariance(positive: DirectionFit, negative: DirectionFit, model: Mode
     if shared is None:
         size = np.sqrt(np.outer(np.diag(one.covariance), np.diag(other.covariance)))
         return np.asarray(together * size)
-    ours, theirs = (
-        (found.influence * found.deviation)[:, own]
-        for found, own in zip((one, other), shared, strict=True)
+    first, second = (
+        (fit.influence * fit.deviation)[:, own]
+        for fit, own in zip((one, other), shared, strict=True)
     )
-    return np.asarray(together * ours @ theirs.T)
+    return np.asarray(together * first @ second.T)
 
 
 def _shared(
     positive: DirectionFit, negative: DirectionFit
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-    """Which points of either direction are of speeds that both have, shape (m,); None: too few."""
-    speeds, ours, theirs = np.intersect1d(positive.place, negative.place, return_indices=True)
-    return (ours, theirs) if len(speeds) > len(PARAMETERS) else None
+    """Indices of the points of both directions at common speeds, shape (m,); None: too few."""
+    speeds, first, second = np.intersect1d(positive.place, negative.place, return_indices=True)
+    return (first, second) if len(speeds) > len(PARAMETERS) else None

@@ -1,11 +1,12 @@
 """The largest friction torque of a torque ramp: the breakaway torque at that ramp rate.
 
-Friction is the drive torque less what accelerates the load (Eq. 4.1). Around its maximum the load
-creeps faster and faster until it slides, so that both parts change smoothly: the drive torque is a
-line, the rate a polynomial, and friction is their difference, without a filter that would bend it.
+Friction is the drive torque less the inertial torque (Eq. 4.1). Around the maximum of friction the
+load creeps at an increasing rate until it slides, so that both torques change smoothly. The drive
+torque is fitted by a line and the rate by a polynomial. Friction is the difference of line and
+inertia times slope, without a filter that would distort it.
 
-The instability sets its own pace: the time in which the rate doubles. The slower the ramp, the more
-paces before its end friction is largest, and the less of it does the end of the rate show.
+The pace is the time in which the rate doubles. With a slower ramp, the maximum of friction lies
+more paces before the end of the ramp, and the end of the rate contains less of it.
 """
 
 from __future__ import annotations
@@ -25,27 +26,26 @@ from campaign.units import rate_text
 
 NAME = "breakaway_torque"
 DEGREE = 5
-"""of the polynomial that the rate is around the maximum."""
+"""Degree of the polynomial of the rate around the maximum."""
 BINS = 60
-"""into which the rate is averaged around the maximum."""
+"""Number of bins in which the rate is averaged around the maximum."""
 REACH = 1.75
-"""Half-width of what is fitted, in paces. On an axis of 70 kg m^2 a pace is 0.2 to 0.4 s: with 1.5
-to 2 of it the polynomial bends as friction does (coverage 94 to 98 %), with 2.5 no longer (68 to
-99 %)."""
+"""Half-width of the fit, in paces. On an axis of 70 kg m^2 a pace is 0.2 to 0.4 s: with 1.5 to 2
+paces the polynomial follows friction (coverage 94 to 98 %), with 2.5 it does not (68 to 99 %)."""
 WIDER = 1.4
-"""times the half-width, as long as noise hides the peak; divided by it, as long as what is left of
-the fit is the polynomial's own error."""
+"""Factor of the half-width: multiplied while noise hides the peak, divided while the residuals are
+the polynomial's own error."""
 NARROWEST, WIDEST = 0.5, 7.0
-"""Half-width (paces) at which that ends."""
+"""Limits of the half-width (paces)."""
 WIDEN, UNSURE = 2.0, 0.4
-"""Standard error over what the torque gains in a pace, which is what the inertia takes at the peak:
-above the first a fit is widened, above the second it does not tell where the peak is."""
+"""Standard error over the gain of torque in a pace, which is the inertial torque at the peak. Above
+the first a fit is widened; above the second it does not determine the time of the peak."""
 INNER = 0.6
-"""of the half-width, within which the maximum lies: near its ends a polynomial's slope is noise."""
+"""Share of the half-width within which the maximum lies: near the ends the slope is noise."""
 POLYNOMIAL = "polynomial of the rate"
 SMOOTH = 0.95
-"""AR(1) coefficient of the residuals from which on they are the polynomial's own error: no noise of
-a gyro lasts that long against a bin."""
+"""AR(1) coefficient of the residuals above which they are the polynomial's own error: gyro noise is
+not correlated over that many bins."""
 METHOD = "line through the torque less inertia times the slope of a quintic through the rate"
 STILL_RISING = Cause("friction still rising", "friction was still rising when the recording ended")
 NO_FALL = Cause(
@@ -58,14 +58,14 @@ TOO_LITTLE_NOISE = Cause(
 
 @dataclass(frozen=True)
 class Breakaway:
-    """What the end of a torque ramp says.
+    """Breakaway torque of a torque ramp.
 
     Attributes:
         torque: the largest friction (N m); a bound of "at least" when friction did not fall
             significantly before the recording ended.
-        peak_time: when friction was largest (s).
-        acceleration: of the load at that time (rad/s^2), as fast as the torque falls when the
-            inertia is said to be larger (N m per kg m^2).
+        peak_time: time of the largest friction (s).
+        acceleration: of the load at that time (rad/s^2); the negative derivative of the torque
+            by the inertia (N m per kg m^2).
     """
 
     torque: Estimate
@@ -84,12 +84,12 @@ def breakaway_torque(
     """Largest friction torque of a torque ramp from rest, with its interval.
 
     time (s), rate (rad/s) and torque (N m) are evenly sampled, shape (n,), and end soon after the
-    load began to slide, which is where the rate passes `threshold` (rad/s); inertia in kg m^2. A
-    ramp to the negative side gives a positive torque, too. The interval is by the delta method,
-    with Student's t and residuals that may be autocorrelated.
+    load begins to slide, where the rate exceeds `threshold` (rad/s); inertia in kg m^2. A ramp in
+    the negative direction also results in a positive torque. The interval is by the delta method,
+    with Student's t and autocorrelated residuals.
     `seen` is the rate smoothed until its sensor resolves `threshold`, shape (n,), NaN where it is
-    not known; absent: the rate itself. It decides when the load slides, and its pace.
-    Raises ValueError when the load never moved that fast, or for too few samples.
+    unknown; default: the rate itself. It determines the start of sliding and the pace.
+    Raises ValueError when the rate never exceeds `threshold`, the torque falls, or samples are few.
     """
     seen = rate if seen is None else seen
     sliding = slides_from(seen, threshold)
@@ -118,24 +118,24 @@ def breakaway_torque(
     )
     if not gain > 0:
         raise ValueError("the torque does not rise before the load slides: that is no ramp")
-    found = fit(about, reach)
-    while found.friction(about)[1] > WIDEN * gain and reach < WIDEST * pace:
+    peak = fit(about, reach)
+    while peak.friction(about)[1] > WIDEN * gain and reach < WIDEST * pace:
         reach *= WIDER
-        found = fit(about, reach)
-    noisy = found.friction(about)[1] > UNSURE * gain
+        peak = fit(about, reach)
+    noisy = peak.friction(about)[1] > UNSURE * gain
     middle = fit(about, max(reach, 1.6 * REACH * pace)).peak_time if noisy else about
     slid = min(float(time[last - 1]), stop - 0.5 * pace)
-    found, end = fit(middle, reach), fit(min(slid, stop - reach), reach)
-    while found.errors.correlation >= SMOOTH and reach > NARROWEST * pace:
+    peak, end = fit(middle, reach), fit(min(slid, stop - reach), reach)
+    while peak.errors.correlation >= SMOOTH and reach > NARROWEST * pace:
         try:
-            found = fit(middle, reach / WIDER)
+            peak = fit(middle, reach / WIDER)
         except ValueError:  # too few samples
             break
         reach /= WIDER
-    peak_time = middle if noisy else found.peak_time
+    peak_time = middle if noisy else peak.peak_time
     wider = fit(peak_time, WIDER * reach).friction(peak_time)
-    told = _told(found, peak_time, end.friction(slid), end.friction(slid - pace), peak_time < slid)
-    return Breakaway(_with_shift(told, wider), peak_time, found.acceleration(peak_time))
+    most = _told(peak, peak_time, end.friction(slid), end.friction(slid - pace), peak_time < slid)
+    return Breakaway(_with_shift(most, wider), peak_time, peak.acceleration(peak_time))
 
 
 def _told(
@@ -145,11 +145,10 @@ def _told(
     before: tuple[float, float],
     passed: bool,
 ) -> Estimate:
-    """The estimate, by friction and its error (N m) as the load slides and a pace before.
+    """Estimate from friction and its error (N m) at the start of sliding and a pace before it.
 
-    `passed`: the maximum lies before the load slides; one behind it is where the recording ends, as
-    of friction that grows with speed. Errors add up: those of two fits that share samples are not
-    independent.
+    `passed`: the maximum lies before sliding; a later one is at the end of the recording, such as
+    of friction that rises with speed. Errors are added: two fits with common samples are dependent.
     """
     (value, error), freedom = found.friction(peak_time), found.errors.freedom
     more = {"standard_error": error, "freedom": freedom, "method": METHOD}
@@ -164,7 +163,7 @@ def _told(
 
 
 def _with_shift(told: Estimate, wider: tuple[float, float]) -> Estimate:
-    """With the polynomial's own error: what a wider fit changes beyond scatter (Hausman 1978)."""
+    """Add the polynomial's own error: the change by a wider fit beyond scatter (Hausman 1978)."""
     change = abs(wider[0] - told.value)
     scatter = abs((told.standard_error or 0.0) ** 2 - wider[1] ** 2) ** 0.5
     if not told.has_interval or change <= 2.0 * scatter:
@@ -174,7 +173,7 @@ def _with_shift(told: Estimate, wider: tuple[float, float]) -> Estimate:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A polynomial through the rate and a line through the torque, over 2 `half` (s) of time."""
+    """Polynomial through the rate and line through the torque, over a time of 2 `half` (s)."""
 
     centre: float
     half: float
@@ -185,7 +184,7 @@ class _Fit:
     inertia: float
 
     def acceleration(self, time: float) -> float:
-        """Of the load (rad/s^2)."""
+        """Acceleration of the load (rad/s^2)."""
         return float(self._slope(time) @ self.of_rate)
 
     def friction(self, time: float) -> tuple[float, float]:
@@ -199,20 +198,20 @@ class _Fit:
 
     @property
     def peak_time(self) -> float:
-        """When friction is largest (s)."""
+        """Time of the largest friction (s)."""
         places = np.linspace(-INNER, INNER, 1001)
         slopes = polynomial.polyval(places, polynomial.polyder(self.of_rate)) / self.half
         friction = self.of_torque[1] * places - self.inertia * slopes
         return self.centre + self.half * float(places[np.argmax(friction)])
 
     def _slope(self, time: float) -> Array:
-        """Of each power of the polynomial (1/s)."""
+        """Slope of each power of the polynomial (1/s)."""
         place, powers = (time - self.centre) / self.half, np.arange(1, DEGREE + 1)
         return np.append(0.0, powers * place ** (powers - 1)) / self.half
 
 
 def _fit(time: Array, rate: Array, torque: Array, inertia: float) -> _Fit:
-    """Of samples where torque and rate are positive; what fills no bin is left out at the start."""
+    """Fit with positive torque and rate; samples that fill no bin are omitted at the start."""
     each = max(1, len(time) // BINS)
     count = len(time) // each
     if count < 2 * (DEGREE + 1):

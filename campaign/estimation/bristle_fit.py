@@ -1,8 +1,8 @@
 """Least-squares fit of the bristle curve to the binned rate of a torque ramp.
 
-The parameters are logarithms, so that stiffness and torque stay positive and their intervals
-suit them: ln stiffness and ln of all torque; of a second interface ln stiffness and ln torque; last
-the gyro's bias, in units of the rate's deviation.
+The parameters are logarithms, so that stiffness, torque and their intervals stay positive: ln
+stiffness and ln of the total torque; ln stiffness and ln torque of a second interface; last the
+gyro's bias, in units of the rate's deviation.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from campaign.estimation.presliding_curve import (
 from campaign.estimation.torque_ramp import FEWEST_BINS, Ramp
 
 EVALUATIONS = 100
-"""of a fit at most; a curve that needs more is not determined."""
+"""Most evaluations of a fit; a curve that needs more is not determined."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where a fit begins, and between which bounds it looks; vectors without the bias."""
+    """Start vectors and bounds of a fit, without the bias."""
 
     vectors: tuple[tuple[float, ...], ...]
     lower: tuple[float, ...]
@@ -35,9 +35,9 @@ class Start:
 
 
 def one_interface(ramp: Ramp, breakaway: float) -> Start:
-    """Of the fit of a single interface that slips near `breakaway` (N m).
+    """Start of the fit of a single interface that slips near `breakaway` (N m).
 
-    Raises ValueError where the rate is zero nearly everywhere.
+    Raises ValueError where the rate is almost always zero.
     """
     if not ramp.typical_rate > np.finfo(float).tiny:
         raise ValueError("the rate of this ramp is zero nearly everywhere before it slides")
@@ -48,7 +48,7 @@ def one_interface(ramp: Ramp, breakaway: float) -> Start:
 
 
 def two_interfaces(ramp: Ramp, breakaway: float, smallest: float) -> Start:
-    """Of the fit of two interfaces, the second carrying at least the torque `smallest` (N m)."""
+    """Start of the fit of two interfaces; the second carries at least `smallest` (N m)."""
     one = one_interface(ramp, breakaway)
     ((stiffness, torque),) = one.vectors
     parts = (float(np.log(share * breakaway)) for share in (0.1, 0.35))
@@ -64,8 +64,8 @@ class BristleFit:
     """A fitted curve.
 
     Attributes:
-        ramp: that was fitted.
-        used: its bins that count, shape (n,).
+        ramp: the fitted ramp.
+        used: mask of the fitted bins, shape (n,).
         vector: the parameters, shape (k,).
         interfaces: the one that carries the largest torque first.
         of_stiffness: index of each interface's ln stiffness in the vector.
@@ -86,16 +86,17 @@ class BristleFit:
     criterion: float
 
     def again(self, ramp: Ramp, breakaway: float, smallest: float) -> Start:
-        """The start of a fit of the same curve to more or less of the ramp."""
+        """Start of a fit of the same curve to another part of the ramp."""
         alone = len(self.interfaces) == 1
-        found = (
+        start = (
             one_interface(ramp, breakaway) if alone else two_interfaces(ramp, breakaway, smallest)
         )
-        return Start((tuple(self.vector[:-1]),), found.lower, found.upper)
+        return Start((tuple(self.vector[:-1]),), start.lower, start.upper)
 
     def change_by_damping(self) -> Array:
-        """What 1 N m s/rad of damping changes in the rates of the bins used (rad/s): it carries its
-        part of the torque, and the bristles bend less.
+        """Change of the rates of the used bins (rad/s) by 1 N m s/rad of damping.
+
+        The damping carries a part of the torque, so that the bristles bend less.
         """
         ramp = self.ramp
         angle = presliding_angle(ramp.torque, self.interfaces)
@@ -103,20 +104,20 @@ class BristleFit:
         return self._change(np.clip(ramp.torque - carried, 0.0, None), self.interfaces)
 
     def change_by(self, interfaces: Sequence[Interface]) -> Array:
-        """What other interfaces would change in the rates of the bins used (rad/s)."""
+        """Change of the rates of the used bins (rad/s) by other interfaces."""
         return self._change(self.ramp.torque, interfaces)
 
     def _change(self, torque: Array, interfaces: Sequence[Interface]) -> Array:
         here = presliding_angle(self.ramp.torque, self.interfaces)
-        there = presliding_angle(torque, interfaces)
-        return np.asarray((np.diff(there - here) / np.diff(self.ramp.edges))[self.used])
+        other = presliding_angle(torque, interfaces)
+        return np.asarray((np.diff(other - here) / np.diff(self.ramp.edges))[self.used])
 
 
 def fit_bristles(ramp: Ramp, smallest: float, start: Start) -> BristleFit | None:
-    """The curve through the bins at rest and those from the torque `smallest` (N m) on.
+    """Fit of the curve to the bins at rest and those from the torque `smallest` (N m) on.
 
     None where the bins do not determine it: too few or at rest, no convergence, a stiffness or a
-    second interface at its bound, parameters that cannot be told apart.
+    second interface at its bound, dependent parameters.
     """
     from scipy.optimize import least_squares
 
@@ -124,7 +125,7 @@ def fit_bristles(ramp: Ramp, smallest: float, start: Start) -> BristleFit | None
     if int(used[ramp.resting :].sum()) < FEWEST_BINS:
         return None
     scale = float(np.std(ramp.rate))
-    if scale == 0.0:  # nothing moved
+    if scale == 0.0:  # no motion
         return None
     data = ramp.rate[used] / scale
     bias = float(np.mean(data[: ramp.resting])) if ramp.resting else 0.0
@@ -185,7 +186,7 @@ class _Bent:
         self._last: tuple[bytes, Array] = (b"", np.empty(0))
 
     def _angle(self, vector: Array) -> Array:
-        """A search asks for the rates and then for their derivatives."""
+        """Angle, cached: a search needs it for the rates and then for their derivatives."""
         key = vector.tobytes()
         if self._last[0] != key:
             self._last = key, presliding_angle(self._ramp.torque, _interfaces(vector))
@@ -196,12 +197,12 @@ class _Bent:
         return np.asarray(np.diff(self._angle(vector)) / self._width)
 
     def derivatives(self, vector: Array, scale: float) -> Array:
-        """Of the rates by the parameters, shape (n, k)."""
+        """Derivatives of the rates by the parameters, shape (n, k)."""
         parts = _interfaces(vector)
         slopes = np.diff(angle_derivatives(self._angle(vector), parts), axis=0)
         slopes /= self._width[:, None]
         columns = [slopes[:, 0] * parts[0].stiffness, slopes[:, 1] * float(np.exp(vector[1]))]
-        if len(parts) > 1:  # what the second carries, the first does not
+        if len(parts) > 1:  # the torque of the second reduces that of the first
             of_torque = (slopes[:, 3] - slopes[:, 1]) * parts[1].torque
             columns += [slopes[:, 2] * parts[1].stiffness, of_torque]
         return np.stack([*columns, np.full(len(slopes), scale)], axis=1)

@@ -1,14 +1,14 @@
 """Extrapolation of an open loop above its sweep, for gain margins.
 
-Far above its corners any rational loop with one more pole than zeros, and a delay, is the start of
+Far above its corners, a rational loop with one more pole than zeros and a delay is approximately
 
     log(jw L) = k0 + k2 w^2 + i (-w delay + lead / w + c3 w^3)
 
-How many terms a sweep carries, and from which frequency on, nobody can tell from the sweep alone:
-with one too few the margin is off by ten of its own standard errors, with one too many it says
-nothing. So three orders (`ORDERS`: terms of the magnitude, terms of the phase) are fitted to three
-parts, and the interval is the hull of theirs. On the bench `platform`, swept to 100 Hz in steps of
-0.5 Hz, the nine lie between 27.9 and 32.3 dB with standard errors below 0.2 dB; 30.9 dB are true.
+The sweep alone does not determine how many terms to fit and from which frequency. With one term too
+few the error of the margin is ten of its standard errors; with one too many it is not determined.
+So three orders (`ORDERS`: terms of magnitude, of phase) are fitted to three parts; the interval is
+the hull of the nine. On the bench `platform`, swept to 100 Hz in steps of 0.5 Hz, the nine margins
+are 27.9 to 32.3 dB, with standard errors below 0.2 dB; the true one is 30.9 dB.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from campaign.estimation.intervals import LEVEL, student
 from campaign.reason import NONE, Cause
 
 UPPER_PARTS = (0.4, 0.3, 0.2)
-"""The sweep above these shares of its highest frequency tells how the response goes on ..."""
+"""Lower ends of the fitted parts, as shares of the highest frequency of the sweep."""
 ABOVE_CORNERS = 2.0
-"""... as far as it is this many times above the gain crossover."""
+"""Least frequency of a fitted part over the gain crossover."""
 REACH = 8.0
-"""times the gain crossover that a sweep must go up to be continued. Of 172 random loops whose sweep
-ended earlier or later, the hull held the margin of 84 % below that and of 97 % above."""
+"""Least highest frequency of the sweep over the gain crossover. Coverage of the hull for 172 random
+loops: 84 % for sweeps that ended below it, 97 % above."""
 FARTHEST = 3.0
-"""times the highest frequency: how far a response is extrapolated at most."""
+"""Highest frequency of an extrapolation over that of the sweep."""
 ORDERS = ((2, 2), (1, 1), (2, 3))
-"""Terms of magnitude and phase; the first, of the first part, gives the value."""
+"""Terms of magnitude and phase; the first order, with the first part, gives the value."""
 FEWEST = 6
-"""Points that the highest order needs."""
+"""Fewest points for the highest order."""
 DECIBEL = 20.0 / np.log(10.0)
-"""dB of a natural logarithm."""
+"""dB per unit of the natural logarithm."""
 NOT_ALL_CROSS = Cause("not all fits cross", "not all fits of the upper sweep cross -180 deg")
 
 
 @dataclass(frozen=True)
 class _Series:
-    """A weighted sum of powers of frequency (relative to `scale`, Hz)."""
+    """Sum of powers of frequency (relative to `scale`, Hz) with coefficients."""
 
     powers: tuple[int, ...]
     scale: float
@@ -54,18 +54,18 @@ class _Series:
 
     @staticmethod
     def of(powers: tuple[int, ...], frequency: Array, values: Array, error: Array) -> _Series:
-        """Fitted to `values` of standard deviation `error`, all of shape (n,).
+        """Fit to `values` with standard deviation `error`, all of shape (n,).
 
-        Where the fit leaves more than noise, its errors grow in proportion.
+        Residuals larger than noise increase its errors in proportion.
         """
         scale = float(frequency[-1])
         basis = (frequency / scale)[:, None] ** np.array(powers, dtype=float)
         weight = 1.0 / error
         inverse = np.linalg.pinv(basis * weight[:, None])
-        found = inverse @ (values * weight)
+        fit = inverse @ (values * weight)
         freedom = len(values) - len(powers)
-        left = float(np.sum(((values - basis @ found) * weight) ** 2)) / freedom
-        return _Series(powers, scale, found, inverse @ inverse.T * max(left, 1.0), freedom)
+        left = float(np.sum(((values - basis @ fit) * weight) ** 2)) / freedom
+        return _Series(powers, scale, fit, inverse @ inverse.T * max(left, 1.0), freedom)
 
     def value(self, frequency: Array) -> Array:
         return np.asarray(self._basis(frequency) @ self.coefficients)
@@ -85,7 +85,7 @@ class _Series:
 
 @dataclass(frozen=True)
 class Continuation:
-    """An open loop above its sweep, of one order.
+    """Extrapolation of an open loop above its sweep, of one order.
 
     Attributes:
         start: highest frequency of the sweep (Hz).
@@ -106,9 +106,9 @@ class Continuation:
         order: tuple[int, int] = ORDERS[0],
         part: float = UPPER_PARTS[0],
     ) -> Continuation | None:
-        """Fitted to the upper part of `loop` (its `told` points) above its gain `crossover` (Hz).
+        """Fit to the upper part of `loop` (its `told` points) above its gain `crossover` (Hz).
 
-        None where that has fewer points than `FEWEST`, or the sweep ends too near the crossover.
+        None for fewer points than `FEWEST`, or where the sweep ends too near the crossover.
         """
         if not len(loop.frequency):
             return None
@@ -123,7 +123,7 @@ class Continuation:
         turns = 2.0 * np.pi * float(np.round(np.median(phase) / (2.0 * np.pi)))
         size, error = np.abs(loop.values[upper]), loop.error[upper]
         error = np.maximum(error, 1e-9 * size)
-        for _ in range(3):  # weights from the fitted size, which noise has not enlarged
+        for _ in range(3):  # weights from the fitted size, which has less noise
             relative = error / size
             gain = _Series.of((0, 2)[: order[0]], frequency, log_gain, relative)
             size = np.exp(gain.value(frequency)) / frequency
@@ -139,7 +139,7 @@ class Continuation:
         return np.asarray(self.turns - 0.5 * np.pi + self.lag.value(frequency))
 
     def falls_through(self, phase: float) -> float | None:
-        """Lowest frequency (Hz) in reach at which the phase falls through a value (rad)."""
+        """Lowest frequency (Hz) in range at which the phase falls through a value (rad)."""
         grid = np.geomspace(UPPER_PARTS[0] * self.start, FARTHEST * self.start, 800)
         above = self.phase(grid) - phase
         at = np.flatnonzero((above[:-1] > 0) & (above[1:] <= 0))
@@ -151,7 +151,7 @@ class Continuation:
 
 @dataclass(frozen=True)
 class Beyond:
-    """A gain margin from how the loop goes on: crossover (Hz) and margin (dB)."""
+    """Gain margin by extrapolation of the loop: crossover (Hz) and margin (dB)."""
 
     crossover: Estimate
     margin: Estimate
@@ -160,27 +160,27 @@ class Beyond:
 def gain_margin_beyond(loop: Response, crossover: float, half_turn: float) -> Beyond | None:
     """Gain margin where the phase, above its measured part, falls through `half_turn` (rad).
 
-    `loop` has only points that tell (`Response.told`); `crossover` (Hz) is its gain crossover.
+    `loop` has only significant points (`Response.told`); `crossover` (Hz) is its gain crossover.
     None when the sweep has too few points far enough above that (`REACH`), or when no fit's phase
-    falls that far within `FARTHEST` times the sweep. Where only some fits' does, the interval is
-    open upwards.
+    falls that far within `FARTHEST` times the sweep. If only some fits cross, the interval has no
+    upper end.
     """
-    found = [
+    fits = [
         _of_order(loop, crossover, half_turn, order, part)
         for part in UPPER_PARTS
         for order in ORDERS
     ]
-    told = [each for each in found if each is not None]
-    if not told:
+    crossing = [each for each in fits if each is not None]
+    if not crossing:
         return None
-    first = found[0] or told[0]
-    closed = len(told) == len(found)
+    first = fits[0] or crossing[0]
+    closed = len(crossing) == len(fits)
     method = "hull of nine fits of an integrator with a delay to the upper sweep"
     reason = NONE if closed else NOT_ALL_CROSS()
 
     def hull(name: str, unit: str, k: int) -> Estimate:
-        low = min(each[k] - each[k + 1] for each in told)
-        high = max(each[k] + each[k + 1] for each in told) if closed else None
+        low = min(each[k] - each[k + 1] for each in crossing)
+        high = max(each[k] + each[k + 1] for each in crossing) if closed else None
         value = first[k]
         return Estimate(name, value, unit, low, high, LEVEL, method, reason)
 

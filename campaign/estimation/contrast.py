@@ -1,19 +1,19 @@
 """Interval of a - R b for two independent estimates: difference and ratio.
 
-The interval for the difference is that of R = 1. The interval for the ratio holds every R for which
-the interval of a - R b holds 0 (Fieller, Journal of the Royal Statistical Society B 16, 1954), so
-that both always say the same: where one holds "equal", so does the other.
+The interval for the difference is that of R = 1. The interval for the ratio includes every R for
+which the interval of a - R b includes 0 (Fieller, Journal of the Royal Statistical Society B 16,
+1954). So both always agree: if one includes "equal", the other does, too.
 
 **Scatter.** Where both intervals are Student's t around their numbers, the variances add and the
 degrees of freedom follow from Welch, Biometrika 34 (1947), and Satterthwaite; GUM G.4.1. Where one
-is lopsided, or found in another way, half-widths add in squares, on each side those that lead
-there: the upper end of a - b is reached by a large a and by a small b (Zou and Donner, Statistics
-in Medicine 27, 2008). That is what `Estimate.combined` does with the parts of one number.
+is asymmetric or from another method, the squares of half-widths add, separately for each end: the
+upper end of a - b results from a large a and a small b (Zou and Donner, Statistics in Medicine 27,
+2008). `Estimate.combined` does the same with the parts of one number.
 
-**Systematic parts.** What both numbers share, shifts both alike: with a correlation of 1 it leaves
-|u_a - R u_b| (GUM 5.2.2, Note 1, equation 16), which is nothing for equal numbers. What they do not
-share, or are not known to, adds in squares. Archives have the size of a part and not its sign; of
-one quantity under one condition it is the same.
+**Systematic parts.** A common part shifts both numbers with a correlation of 1: |u_a - R u_b|
+remains (GUM 5.2.2, Note 1, equation 16), which is 0 for equal parts and R = 1. Squares of other
+parts add. Archives contain the size of a part without its sign; the sign is the same for one
+quantity under one condition.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from campaign.estimate import Estimate, Systematic
 from campaign.estimation.intervals import LEVEL, student, welch
 
 LOPSIDED = 0.1
-"""Share of its half-width by which an interval may lean and still be taken as Student's t."""
+"""Largest asymmetry over half-width of an interval that counts as Student's t."""
 AGREES = 0.02
-"""Share of a half-width by which it may differ from its standard error times Student's t."""
+"""Largest relative difference of a half-width from its standard error times Student's t."""
 DOUBLINGS = 60
-"""How far outward an end of a ratio is looked for, in doublings of the half-width at the ratio."""
+"""Range of the search for an end of a ratio, in doublings of the half-width at the ratio."""
 SMALLEST = -600.0
-"""Logarithm of the smallest p value that is told apart."""
+"""Logarithm of the smallest p value."""
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """A number `value` that scatters by `below` and `above` (1 sigma) on its two sides.
+    """A number `value` with standard errors `below` and `above` (1 sigma).
 
     Attributes:
         below, above: standard errors towards smaller and larger values; infinite where that side
             is open.
-        freedom: degrees of freedom of both; infinite when they are known.
+        freedom: degrees of freedom of both; infinite when the errors are exact.
         shift: root of the sum of squares of the systematic parts (1 sigma).
-        welch: whether `below` and `above` are one standard error, of a Student's t.
+        welch: whether `below` and `above` are the same standard error, of a Student's t.
     """
 
     value: float
@@ -65,7 +65,7 @@ class Contrast:
 
     @property
     def towards_zero(self) -> float:
-        """How many half-widths (95 %) 0 lies away, on the side where it lies; over 1: outside."""
+        """Distance of 0 in half-widths (95 %) of its side; above 1: outside the interval."""
         half = self.half(upper=self.value < 0)
         if math.isinf(half):
             return 0.0
@@ -73,9 +73,9 @@ class Contrast:
 
     @property
     def p(self) -> float:
-        """Two-sided p value of 0: the level at which the interval would just hold it.
+        """Two-sided p value of 0: 1 less the level of the interval that ends at 0.
 
-        Below 5 % exactly when the 95 % interval does not hold 0.
+        Below 5 % exactly when the 95 % interval does not include 0.
         """
         from scipy.optimize import brentq
         from scipy.special import ndtr, stdtr
@@ -105,7 +105,7 @@ def contrast(
 ) -> Contrast:
     """`one` - `factor` * `other`, of independent estimates in one unit, each with an interval.
 
-    shared: sources of systematic parts that are one and the same for both numbers.
+    shared: sources of systematic parts that are the same for both numbers.
     """
     value, size = one.value - factor * other.value, abs(factor)
     parts = left_over(one, other, factor, shared)
@@ -131,9 +131,9 @@ def contrast(
 
 
 def is_student(estimate: Estimate) -> bool:
-    """Whether its interval is that of Student's t with its standard error, or nearly so.
+    """Whether the interval is approximately Student's t with the standard error.
 
-    One in the logarithm is, as long as it is narrow; one at a bound or of another method is not.
+    This includes a narrow interval in the logarithm, but none at a bound or of another method.
     """
     if estimate.standard_error is None or estimate.low is None or estimate.high is None:
         return False
@@ -146,61 +146,61 @@ def is_student(estimate: Estimate) -> bool:
 def left_over(
     one: Estimate, other: Estimate, factor: float = 1.0, shared: Collection[str] = ()
 ) -> tuple[Systematic, ...]:
-    """The systematic parts of `one` - `factor` * `other`, by source.
+    """Systematic parts of `one` - `factor` * `other`, by source.
 
-    What is shared is told only where something of known size is left of it. A source of which
-    either side does not know the size is told with what is known, and once more as unknown.
+    A shared source has a part only if a known size remains. A source with an unknown size on either
+    side has a part for the known sizes, and a second one of unknown size.
     """
     sizes = [_by_source(one, 1.0), _by_source(other, abs(factor))]
-    found: list[Systematic] = []
+    parts: list[Systematic] = []
     for source in dict.fromkeys((*sizes[0], *sizes[1])):
         known = [sum_of(own[source]) for own in sizes if source in own and _known(own[source])]
         if source in shared and all(source in own for own in sizes):
             left = abs(known[0] - known[1]) if len(known) == 2 else 0.0
             if left:
-                found.append(Systematic(source, left))
+                parts.append(Systematic(source, left))
             continue
         if known:
-            found.append(Systematic(source, math.hypot(*known)))
+            parts.append(Systematic(source, math.hypot(*known)))
         if any(None in own.get(source, ()) for own in sizes):
-            found.append(Systematic(source, None))
-    return tuple(found)
+            parts.append(Systematic(source, None))
+    return tuple(parts)
 
 
 def sum_of(sizes: list[float | None]) -> float:
-    """Root of the sum of squares of those that are known."""
+    """Root of the sum of squares of the known sizes."""
     return math.hypot(*(size or 0.0 for size in sizes))
 
 
 def ratio_ends(
     one: Estimate, other: Estimate, shared: Collection[str] = ()
 ) -> tuple[float | None, float | None]:
-    """Low and high of `one` / `other`: all R for which the interval of one - R other holds 0.
+    """Low and high of `one` / `other`: all R for which the interval of one - R other includes 0.
 
-    None on a side where no R is large enough to be excluded. Both None where `other` cannot be told
-    from 0: then no ratio is.
+    None on a side where no R is excluded. Both None where the interval of `other` includes 0: then
+    there is no ratio.
     """
     if not other.value or not _told_from_zero(other):
         return None, None
     middle = one.value / other.value
-    there = contrast(one, other, middle, shared)
-    if not (there.half(upper=False) or there.half(upper=True)):
-        return middle, middle  # nothing scatters
+    centre = contrast(one, other, middle, shared)
+    if not (centre.half(upper=False) or centre.half(upper=True)):
+        return middle, middle  # no uncertainty
     return _outward(one, other, middle, -1.0, shared), _outward(one, other, middle, 1.0, shared)
 
 
 def _outward(
     one: Estimate, other: Estimate, middle: float, way: float, shared: Collection[str]
 ) -> float | None:
-    """The first R beyond `middle` in the direction `way` that the interval excludes."""
+    """First R beyond `middle` in the direction `way` (-1 or 1) that the interval excludes."""
     from scipy.optimize import brentq
 
     def excluded(far: float) -> float:
         return contrast(one, other, middle + way * far, shared).towards_zero - 1.0
 
-    there = contrast(one, other, middle, shared)
+    centre = contrast(one, other, middle, shared)
     halves = [
-        half for half in (there.half(upper=True), there.half(upper=False)) if 0 < half < math.inf
+        half for half in (centre.half(upper=True), centre.half(upper=False)) if 0 < half < math.inf
     ]
     near, far = 0.0, max(halves, default=abs(one.value)) / abs(other.value) or 1e-9
     for _ in range(DOUBLINGS):
@@ -218,7 +218,7 @@ def _told_from_zero(estimate: Estimate) -> bool:
 
 
 def _sides(estimate: Estimate) -> tuple[float, float]:
-    """Half-widths that scatter leaves below and above; infinite on an open side."""
+    """Half-widths by scatter below and above; infinite on an open side."""
     low, high, value = estimate.low, estimate.high, estimate.value
     return (
         math.inf if low is None else max(value - low, 0.0),
@@ -227,11 +227,11 @@ def _sides(estimate: Estimate) -> tuple[float, float]:
 
 
 def _by_source(estimate: Estimate, size: float) -> dict[str, list[float | None]]:
-    found: dict[str, list[float | None]] = {}
+    sizes: dict[str, list[float | None]] = {}
     for part in estimate.systematic:
         own = part.standard_uncertainty
-        found.setdefault(part.source, []).append(None if own is None else size * own)
-    return found
+        sizes.setdefault(part.source, []).append(None if own is None else size * own)
+    return sizes
 
 
 def _known(sizes: list[float | None]) -> bool:

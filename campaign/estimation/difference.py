@@ -1,6 +1,6 @@
 """Difference of two findings of one quantity: size, share, p value.
 
-Differences are of the second minus the first, which is the reference.
+A difference is the second finding minus the first, which is the reference.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ WITH_A_BOUND = Cause("difference of bounds", "a bound takes part")
 
 @dataclass(frozen=True)
 class Difference:
-    """What a pair of estimates comes to.
+    """Difference of a pair of estimates, with its test.
 
     Attributes:
-        difference: in the unit of the reference (SI); a bound where a bound takes part.
+        difference: in the unit of the reference (SI); a bound where one of the two is a bound.
         change: the difference as a share of the size of the reference (1 is 100 %); NaN where the
             reference is 0 or the sign changes.
-        p: two-sided, of "no difference"; None where nothing can be tested, and `reason` says why.
-        reason: why there is no p value; none when there is one.
+        p: two-sided, of "no difference"; None where no test is possible (see `reason`).
+        reason: why there is no p value; `NONE` where there is one.
     """
 
     difference: Estimate
@@ -57,12 +57,12 @@ class Difference:
 
 
 def difference_of(reference: Estimate, other: Estimate, shared: Collection[str] = ()) -> Difference:
-    """`other` - `reference`, of independent estimates whose units go together.
+    """`other` - `reference`, of independent estimates with compatible units.
 
-    shared: sources of systematic parts that are one and the same for both, such as the torque
-        constant of one drive; they cancel (`contrast`).
+    shared: sources of systematic parts that are the same for both, such as the torque constant of
+        one drive; they cancel (`contrast`).
 
-    Raises ValueError for units that do not go together.
+    Raises ValueError for incompatible units.
     """
     other = in_unit(other, reference.unit)
     if math.isnan(reference.value) or math.isnan(other.value):
@@ -73,16 +73,16 @@ def difference_of(reference: Estimate, other: Estimate, shared: Collection[str] 
     reason = _why_without(reference, other)
     if reason:
         return _untold(reference, other, value, reason)
-    found = contrast(other, reference, 1.0, shared)
-    told = _estimate(found, reference, other, shared)
+    test = contrast(other, reference, 1.0, shared)
+    difference = _estimate(test, reference, other, shared)
     change = _change(reference, other, shared)
-    if not (told.low is None or told.high is None):
-        return Difference(told, change, found.p)
-    return Difference(told, change, None, OPEN_SIDE())
+    if not (difference.low is None or difference.high is None):
+        return Difference(difference, change, test.p)
+    return Difference(difference, change, None, OPEN_SIDE())
 
 
 def in_unit(estimate: Estimate, unit: str) -> Estimate:
-    """The same number in another unit. Raises ValueError when it measures something else."""
+    """Estimate in another unit. Raises ValueError for a unit of another quantity."""
     if estimate.unit == unit:
         return estimate
     return replace(multiplied(estimate, float(factor(estimate.unit, unit))), unit=unit)
@@ -91,7 +91,7 @@ def in_unit(estimate: Estimate, unit: str) -> Estimate:
 def _estimate(
     found: Contrast, reference: Estimate, other: Estimate, shared: Collection[str]
 ) -> Estimate:
-    """The difference, its scatter and what is systematic of it apart, as estimates have them."""
+    """Estimate of the difference, with scatter and systematic parts apart."""
     scatter = replace(found, shift=0.0)
     low, high = (scatter.half(upper=False), scatter.half(upper=True))
     how = "Welch" if found.welch else "half-widths in squares"
@@ -110,7 +110,7 @@ def _estimate(
 
 
 def _change(reference: Estimate, other: Estimate, shared: Collection[str]) -> Estimate:
-    """The difference over the size of the reference; the systematic parts are in low and high."""
+    """Difference over the size of the reference; low and high include the systematic parts."""
     if why := _no_share(reference, other):
         return Estimate.without_interval(CHANGE, math.nan, "", why)
     low, high = ratio_ends(other, reference, shared)
@@ -126,7 +126,7 @@ def _change(reference: Estimate, other: Estimate, shared: Collection[str]) -> Es
 
 
 def _no_share(reference: Estimate, other: Estimate) -> Reason:
-    """Why the difference is no share of the reference; none where it is one."""
+    """Why the difference has no share of the reference; `NONE` where it has."""
     if not reference.value:
         return ZERO()
     return SIGN_CHANGE() if reference.value * other.value < 0 else NONE
@@ -138,7 +138,7 @@ def _share(ratio: float, reference: Estimate) -> float:
 
 
 def _untold(reference: Estimate, other: Estimate, value: float, reason: Reason) -> Difference:
-    """Without interval, and why."""
+    """Difference without an interval, with the reason."""
     share = math.nan if _no_share(reference, other) else value / abs(reference.value)
     return Difference(
         Estimate.without_interval(DIFFERENCE, value, reference.unit, reason),
@@ -155,7 +155,7 @@ def _why_none(reference: Estimate, other: Estimate) -> Reason:
 
 
 def _why_without(reference: Estimate, other: Estimate) -> Reason:
-    """Why the difference of two numbers has no interval; none where it has one."""
+    """Why the difference of two numbers has no interval; `NONE` where it has."""
     for each, alone in ((reference, "the reference"), (other, "the other")):
         if each.kind == "quantile":
             return NOT_A_MEAN()
@@ -172,7 +172,7 @@ def _why_without(reference: Estimate, other: Estimate) -> Reason:
 
 
 def _in_brackets(reason: Reason) -> Reason:
-    """As an aside behind another text; none stays none."""
+    """Reason in brackets, to follow another text; `NONE` stays `NONE`."""
     return replace(reason, text=f" ({reason})") if reason else reason
 
 
@@ -181,11 +181,11 @@ def _whose(of_reference: bool, of_other: bool) -> str:
 
 
 def _of_bounds(reference: Estimate, other: Estimate) -> Difference:
-    """The bound that is left of a difference in which bounds take part; none of two alike.
+    """Bound of a difference with bounds; no bound for two bounds on the same side.
 
-    Ends are subtracted as they stand, which needs no independence.
+    The ends are subtracted directly, which needs no independence.
     """
-    # Where each may lie: a bound to its side, a number within its interval.
+    # Range of each: open on one side for a bound, the interval for a number.
     (a_low, a_high), (b_low, b_high) = other.combined, reference.combined
     low = None if a_low is None or b_high is None else a_low - b_high
     high = None if a_high is None or b_low is None else a_high - b_low
@@ -195,15 +195,15 @@ def _of_bounds(reference: Estimate, other: Estimate) -> Difference:
         reason = ALIKE_BOUNDS() if alike else BOUND_ALONE()
         return _untold(reference, other, value, reason)
     end, kind = (high, "at most") if low is None else (low, "at least")
-    told = Estimate(
+    left = Estimate(
         DIFFERENCE,
         float(end or 0.0),
         reference.unit,
         method="ends of bounds",
         kind=kind,  # type: ignore[arg-type]
     )
-    share = replace(told, name=CHANGE, unit="", value=told.value / abs(reference.value or math.nan))
+    share = replace(left, name=CHANGE, unit="", value=left.value / abs(reference.value or math.nan))
     if not (reference.value and reference.kind not in BOUNDS):
-        # Over a bound a share would not be one.
+        # A share needs a reference that is no bound.
         share = Estimate.without_interval(CHANGE, math.nan, "", OF_A_BOUND())
-    return Difference(told, share, None, WITH_A_BOUND())
+    return Difference(left, share, None, WITH_A_BOUND())

@@ -9,24 +9,24 @@ import numpy as np
 from campaign.arrays import Array
 
 EXPLAINED = 0.9
-"""Share of a signal's variance that a single sine must explain to be called one."""
+"""Least share of a signal's variance that a single sine explains."""
 LEAST_CYCLES = 2.0
-"""cycles of a sine in a recording, for its frequency to be told."""
+"""Fewest cycles of a sine in a recording for an estimate of its frequency."""
 RAMP_PART = (0.2, 0.8)
-"""Part of a ramp's height on which its line lies."""
+"""Part of a ramp's height that is fitted by a line."""
 NOISE = 5.0
-"""Standard deviations of the standstill before it that a step is larger than."""
+"""Least size of a step, in standard deviations of the standstill before it."""
 PLATEAU = 0.02
-"""of its height, within which a step has arrived."""
+"""Share of its height within which a step has reached its level."""
 CHOOSE = "where the recording holds several steps, start and stop choose one"
 LEVEL_PART = 0.004
-"""of its height that a ramp gains in a twentieth of its time, at least; a level gains less."""
+"""Least gain of a ramp in a twentieth of its time, as a share of its height; a level gains less."""
 CYCLES_SEEN = 3.0
-"""cycles of a sine in a recording, at least, for where it begins and ends to be looked for."""
+"""Fewest cycles in a recording for a search of the begin and end of a sine."""
 LEAST_SHARE = 0.1
-"""of a recording that a sine which rests before and after must last."""
+"""Least share of a recording for a sine with rest before and after."""
 OUTSIDE = 0.2
-"""of a sine's amplitude that a signal may scatter where the sine is not, to be at rest there."""
+"""Largest scatter of a signal at rest outside of the sine, over the sine's amplitude."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class FoundSine:
 
 @dataclass(frozen=True)
 class FoundStep:
-    """From `before` to `after`, beginning at time `at` (s) and over after `ramp` (s)."""
+    """Step from `before` to `after`, from time `at` (s) on, with the duration `ramp` (s)."""
 
     at: float
     ramp: float
@@ -64,12 +64,12 @@ class FoundRamp:
 
 
 def found_sine(signal: Array, sample_rate: float, frequency: float | None = None) -> FoundSine:
-    """The sine that a signal, shape (n,), is.
+    """Sine of a whole signal, shape (n,).
 
     Args:
-        frequency: where it is known (Hz).
+        frequency: (Hz); None: unknown.
 
-    Raises ValueError where it is none, or too short to tell.
+    Raises ValueError for missing samples, a signal that is no sine, or too few cycles.
     """
     if not np.isfinite(signal).all():
         raise ValueError("samples are missing in it")
@@ -94,7 +94,7 @@ def found_sine(signal: Array, sample_rate: float, frequency: float | None = None
 
 @dataclass(frozen=True)
 class FoundStretch:
-    """A sine and the samples, first <= i < stop, in which it is; its phase is at sample 0."""
+    """Sine and its samples, first <= i < stop; its phase is at sample 0."""
 
     sine: FoundSine
     first: int
@@ -102,12 +102,12 @@ class FoundStretch:
 
 
 def sine_stretch(signal: Array, sample_rate: float, frequency: float | None = None) -> FoundStretch:
-    """The sine of a signal, shape (n,), that may rest before and after it.
+    """Sine of a signal, shape (n,), with or without rest before and after it.
 
     Args:
-        frequency: where it is known (Hz).
+        frequency: (Hz); None: unknown.
 
-    Raises ValueError where there is none, or it rests in between.
+    Raises ValueError for a signal without a sine, or with a rest in between.
     """
     wrong, whole = "", None
     try:
@@ -130,7 +130,7 @@ def sine_stretch(signal: Array, sample_rate: float, frequency: float | None = No
 
 
 def from_start(sine: FoundSine, start: float) -> FoundSine:
-    """A sine of a stretch that begins at `start` (s), with its phase at time zero."""
+    """Sine of a stretch that begins at `start` (s), with its phase shifted to time zero."""
     phase = sine.phase - 2.0 * np.pi * sine.frequency * start
     return replace(sine, phase=float(np.angle(np.exp(1j * phase))))
 
@@ -138,8 +138,9 @@ def from_start(sine: FoundSine, start: float) -> FoundSine:
 def _where_it_swings(
     signal: Array, sample_rate: float, frequency: float | None
 ) -> tuple[int, int] | None:
-    """First and stop of the one stretch in which a sine is; None where it is all of the signal,
-    or where what is left of the signal is no rest.
+    """First and stop of the only stretch with a sine.
+
+    None where that is the whole signal, or where the rest of the signal is not at rest.
     """
     if not np.isfinite(signal).all():
         return None
@@ -150,7 +151,7 @@ def _where_it_swings(
     cycle = round(sample_rate / frequency)
     if cycle < 2 or len(signal) < CYCLES_SEEN * cycle:
         return None
-    # Its amplitude over the cycle around each sample.
+    # Amplitude over the cycle around each sample.
     turning = about * np.exp(-2j * np.pi * frequency * np.arange(len(signal)) / sample_rate)
     sums = np.concatenate([[0.0], np.cumsum(turning)])
     place = np.arange(len(signal))
@@ -158,11 +159,11 @@ def _where_it_swings(
     high = np.minimum(place - cycle // 2 + cycle, len(signal))
     envelope = 2.0 * np.abs(sums[high] - sums[low]) / (high - low)
     height = float(np.quantile(envelope, 1.0 - LEAST_SHARE))
-    there = np.flatnonzero(envelope > 0.5 * height)
-    if not len(there):
+    large = np.flatnonzero(envelope > 0.5 * height)
+    if not len(large):
         return None
-    first, stop = int(there[0]), int(there[-1]) + 1
-    # At the ends of a recording half of the cycle is not seen: less than that is no rest.
+    first, stop = int(large[0]), int(large[-1]) + 1
+    # At the ends of a recording half of the cycle is missing: a shorter part is no rest.
     first, stop = (
         (0 if first <= cycle // 4 else first),
         (len(signal) if stop >= len(signal) - cycle // 4 else stop),
@@ -178,20 +179,20 @@ def _where_it_swings(
 
 
 def _best(time: Array, signal: Array, middle: float, width: float) -> float:
-    """The frequency within `width` of `middle` (Hz) at which a sine explains most."""
+    """Frequency within `width` of `middle` (Hz) at which a sine explains most."""
     from scipy.optimize import minimize_scalar
 
     def left(offset: float) -> float:
         return -_sine_at(time, signal, middle + offset)[1]
 
-    # Of an offset: the search resolves a share of what it varies.
+    # The variable is an offset, because the resolution of the search is relative to it.
     fine = {"xatol": 1e-9 * width}
-    found = minimize_scalar(left, bounds=(-width, width), method="bounded", options=fine)
-    return middle + float(found.x)
+    result = minimize_scalar(left, bounds=(-width, width), method="bounded", options=fine)
+    return middle + float(result.x)
 
 
 def _sine_at(time: Array, signal: Array, frequency: float) -> tuple[Array, float]:
-    """Sine and cosine parts and offset, and the share of the variance that they explain."""
+    """Sine and cosine parts and offset, and their share of the variance."""
     angle = 2.0 * np.pi * frequency * time
     columns = np.column_stack([np.sin(angle), np.cos(angle), np.ones(len(time))])
     fit, *_ = np.linalg.lstsq(columns, signal, rcond=None)
@@ -202,9 +203,9 @@ def _sine_at(time: Array, signal: Array, frequency: float) -> tuple[Array, float
 
 
 def found_step(time: Array, signal: Array) -> FoundStep:
-    """The one step of a signal between two levels.
+    """Only step of a signal between two levels.
 
-    Raises ValueError where it makes none, or several.
+    Raises ValueError for no step, several steps, or fewer than ten samples.
     """
     known = np.isfinite(signal)
     time, signal = time[known], signal[known]
@@ -232,27 +233,25 @@ def found_step(time: Array, signal: Array) -> FoundStep:
     gone = (signal - before) / size
     level = max(PLATEAU, NOISE * scatter / abs(size))
     left = np.flatnonzero(gone[: middle + 1] <= level)
-    there = np.flatnonzero(gone[middle:] >= 1.0 - level)
+    reached = np.flatnonzero(gone[middle:] >= 1.0 - level)
     start = float(time[left[-1]]) if len(left) else float(time[0])
-    end = float(time[middle + there[0]]) if len(there) else float(time[middle])
+    end = float(time[middle + reached[0]]) if len(reached) else float(time[middle])
     step = float(np.median(np.diff(time)))
-    # A jump is between two samples: the later one is the first that has it.
+    # A jump lies between two samples: its time is that of the later one.
     ramp = end - start if end - start > 1.5 * step else 0.0
     return FoundStep(end if ramp == 0.0 else start, ramp, before, after)
 
 
 def _stays_between(signal: Array, first: float, after: float) -> bool:
-    """Whether a signal, shape (n,), on its way between two levels keeps to another for a while."""
+    """Whether a signal, shape (n,), stays at a level between two levels for some time."""
     gone = (signal - first) / (after - first)
-    left, there = np.flatnonzero(gone <= 0.05), np.flatnonzero(gone >= 0.95)
-    if not len(left) or not len(there):
+    left, last = np.flatnonzero(gone <= 0.05), np.flatnonzero(gone >= 0.95)
+    if not len(left) or not len(last):
         return False
-    way = (
-        gone[int(left[left < there[0]][-1]) + 1 : int(there[0])] if left[0] < there[0] else gone[:0]
-    )
-    half = max(len(way) // 20, 5)
-    halves = way[: len(way) // half * half].reshape(-1, half)
-    # Of the noise: of white noise, whose differences the few steps do not show in their median.
+    rise = gone[int(left[left < last[0]][-1]) + 1 : int(last[0])] if left[0] < last[0] else gone[:0]
+    half = max(len(rise) // 20, 5)
+    halves = rise[: len(rise) // half * half].reshape(-1, half)
+    # For white noise; the median of the differences excludes the few steps.
     noise = float(np.median(np.abs(np.diff(gone)))) / (0.6745 * 2**0.5)
     if len(halves) < 2 or 3.0 * noise * (2.0 * 1.57 / half) ** 0.5 > LEVEL_PART:
         return False
@@ -260,9 +259,9 @@ def _stays_between(signal: Array, first: float, after: float) -> bool:
 
 
 def found_ramp(time: Array, signal: Array, until: float) -> FoundRamp:
-    """The ramp by which a signal reaches what it is at time `until` (s).
+    """Ramp of a signal that ends at time `until` (s).
 
-    Raises ValueError where it does not rise, or fall, to there from a standstill.
+    Raises ValueError where the signal has no ramp from its first level to that time.
     """
     part = (time <= until) & np.isfinite(signal)
     time, signal = time[part], signal[part]

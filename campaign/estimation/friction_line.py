@@ -1,10 +1,10 @@
 """Coulomb and viscous friction of one direction from a few steady stretches: a straight line.
 
-Friction of sliding, F = Fc + Fv |v|, as far as it shows at the speeds there are. Each stretch is
-one observation: what differs between them (place, load, time) is the scatter that the interval
-holds, and the samples within a stretch only tell how well its own mean is known. Stretches that
-follow each other are alike where friction runs in or drifts, so they stand in order of time, and
-their scatter is taken as an AR(1) process (`autocorrelated.errors_of`).
+Friction of sliding, F = Fc + Fv |v|, at the measured speeds. Each stretch is one observation. The
+interval includes the scatter between stretches (place, load, time); the samples within a stretch
+determine only the error of its own mean. Neighboring stretches are correlated where friction runs
+in or drifts. Therefore they are in order of time, and their scatter is an AR(1) process
+(`autocorrelated_errors.errors_of`).
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from campaign.estimation.intervals import SINGLE_VALUE, student, with_error
 from campaign.estimation.least_squares import propagated
 
 APART = 1.5
-"""Fastest over slowest of the speeds, at least: a line through one speed tells no slope."""
+"""Least ratio of fastest to slowest speed: a line through one speed has no slope."""
 METHOD = "straight line through steady stretches, deviation from their scatter, AR(1) in time"
 OF_MEAN = "mean of steady stretches, deviation from their scatter, AR(1) in time"
 IN_ORDER = 0.8
-"""Correlation of speed and time beyond which a drift of friction looks like viscous friction."""
+"""Correlation of speed and time above which a drift of friction looks like viscous friction."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class FrictionLine:
         coulomb: extrapolated to standstill (N m), as fitted.
         viscous: slope (N m s/rad), as fitted.
         covariance: of the two, shape (2, 2).
-        freedom: of their scatter: less, where neighbours are alike.
+        freedom: degrees of freedom of their scatter: fewer with correlated neighbors.
     """
 
     coulomb: Estimate
@@ -52,33 +52,33 @@ class FrictionLine:
 
 
 def friction_line(speed: Array, torque: Array) -> FrictionLine:
-    """The line through stretches of one direction.
+    """Line through the stretches of one direction.
 
     Args:
         speed: of each stretch, positive, shape (n,), in order of time.
         torque: friction against the motion, in its direction (positive), shape (n,).
 
-    Raises ValueError where there are fewer than three stretches, or only about one speed.
+    Raises ValueError for fewer than three stretches, or almost equal speeds.
     """
     if len(speed) < 3:
         raise ValueError(f"{len(speed)} steady stretches show no line; three are the fewest")
     if speed.max() < APART * speed.min():
         raise ValueError("all steady stretches are about as fast, which shows no slope")
     columns = np.column_stack([np.ones(len(speed)), speed])
-    found, *_ = np.linalg.lstsq(columns, torque, rcond=None)
-    covariance, freedom = _covariance(columns, torque - columns @ found)
+    line, *_ = np.linalg.lstsq(columns, torque, rcond=None)
+    covariance, freedom = _covariance(columns, torque - columns @ line)
     errors = np.sqrt(np.diag(covariance))
     coulomb, viscous = (
         with_error(name, float(value), unit, float(error), freedom, METHOD)
         for name, unit, value, error in zip(
-            ("coulomb_torque", "viscous_friction"), ("N m", "N m s/rad"), found, errors, strict=True
+            ("coulomb_torque", "viscous_friction"), ("N m", "N m s/rad"), line, errors, strict=True
         )
     )
     return FrictionLine(coulomb, viscous, covariance, freedom)
 
 
 def mean_of_stretches(name: str, values: Array, unit: str) -> Estimate:
-    """Mean of what stretches show, shape (n,), in order of time; t with n - 1."""
+    """Mean of values of stretches, shape (n,), in order of time; errors with AR(1)."""
     mean, count = float(np.mean(values)), len(values)
     if count < 2:
         reason = SINGLE_VALUE(what="steady stretch", others="others")
@@ -88,21 +88,21 @@ def mean_of_stretches(name: str, values: Array, unit: str) -> Estimate:
 
 
 def in_order_of_time(speed: Array) -> bool:
-    """Whether speeds rise, or fall, as time goes on, so that nobody can tell the two apart."""
+    """Whether speeds rise or fall with time, so that both effects cannot be separated."""
     if len(speed) < 3 or np.ptp(speed) == 0:
         return False
     return bool(abs(np.corrcoef(speed, np.arange(len(speed)))[0, 1]) > IN_ORDER)
 
 
 def _covariance(columns: Array, left: Array) -> tuple[Array, float]:
-    """Of least-squares parameters by their residuals in order, and its degrees of freedom.
+    """Covariance of least-squares parameters from residuals in order, and degrees of freedom.
 
-    Of n values with an AR(1) coefficient r as many as n (1 - r) / (1 + r) are independent; how many
-    there are is all that is known of the scatter. Zero where nothing is left over.
+    With an AR(1) coefficient r the effective number of n values is n (1 - r) / (1 + r), which
+    limits the degrees of freedom. The covariance is zero without residuals.
     """
     count, parameters = columns.shape
     if float(left @ left) <= np.finfo(float).eps ** 2 * float(np.sum(columns**2)):
         return np.zeros((parameters, parameters)), float(count - parameters)
-    found = errors_of(columns, left)
-    independent = count * (1.0 - found.correlation) / (1.0 + found.correlation)
-    return found.covariance, max(1.0, min(independent, count) - parameters)
+    errors = errors_of(columns, left)
+    independent = count * (1.0 - errors.correlation) / (1.0 + errors.correlation)
+    return errors.covariance, max(1.0, min(independent, count) - parameters)

@@ -1,4 +1,4 @@
-"""Angle over which friction forgets a reversal."""
+"""Memory angle of friction after a reversal."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from campaign.arrays import Array
 
 LEVELS = (0.5, 0.9)
-"""of the settled torque, between which the load's displacement is taken."""
+"""Shares of the settled torque between which the displacement is measured."""
 BINS = 500
-"""into which a reversal is averaged, so that noise passes no level for friction."""
+"""Number of bins of a reversal, so that noise does not cross a level before friction."""
 
 
 def memory_angle(time: Array, rate: Array, torque: Array, settled: float) -> float:

@@ -1,9 +1,9 @@
 """Admission of a parameter: is it determined, and physically possible?
 
-A parameter is *determined* where its interval is narrow against its value, or against what matters
-on this rig. It is *possible* where a rig can have it. One that may be zero and cannot be negative
-gets an upper bound. What does not pass keeps value and interval, is *not determined* and says why:
-it has no key, and no place in a bench file.
+A parameter is *determined* if its interval is narrow relative to its value, or to a relevant size
+on this rig. It is *possible* if a rig can have it. A parameter that may be zero and cannot be
+negative has an upper bound as result. A refused parameter keeps value and interval, and is *not
+determined*, with a reason: it has no key, and no place in a bench file.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from campaign.estimate import Estimate, Origin
 from campaign.reason import Cause, Reason
 
 USELESS = 0.5
-"""Half-width over the larger of value and what matters beyond which nothing is determined."""
+"""Largest half-width of a determined parameter, over the larger of value and relevant size."""
 MATTERS = 0.05
-"""Share of the largest force that was recorded below which a force does not matter on a rig."""
+"""Share of the largest recorded force below which a force is irrelevant on a rig."""
 NOT_NEGATIVE = {
     "breakaway", "bristle", "coefficient", "coulomb", "damping", "inertia", "static", "stiffness",
     "stribeck", "viscous",
 }  # fmt: skip
-"""Words in names of what no rig has below zero; `over` is in those of ratios and changes."""
+"""Words in names of nonnegative parameters; names of ratios and changes contain `over`."""
 FRICTION = ("friction_positive", "friction_negative")
 """Names of friction at one speed."""
 
@@ -53,12 +53,11 @@ NEGATIVE = Cause("negative", "check sign, scale and zero of force and motion")
 
 
 def admitted(estimate: Estimate, matters: float = 0.0, cause: Reason | None = None) -> Estimate:
-    """The estimate as it may be reported.
+    """Estimate for the report: unchanged, as an upper bound, or refused.
 
     Args:
-        matters: size (in the estimate's unit) below which it does not matter on this rig; 0 where
-            that is not known.
-        cause: why a negative one is likely to be so.
+        matters: size (in the estimate's unit) below which it is irrelevant on this rig; 0: unknown.
+        cause: likely cause of a negative value.
     """
     if estimate.origin is not Origin.MEASURED or estimate.kind != "number":
         return estimate
@@ -79,7 +78,7 @@ def admitted(estimate: Estimate, matters: float = 0.0, cause: Reason | None = No
 def admitted_together(
     found: Mapping[str, Estimate], matters: Mapping[str, float]
 ) -> dict[str, Estimate]:
-    """Parameters of one model, by name: which of them are negative tells the likely cause."""
+    """Parameters of one model, by name; the set of negative ones determines the likely cause."""
     negative = {name for name, one in found.items() if _is_negative(one)}
     passed = {}
     for name, one in found.items():
@@ -93,35 +92,35 @@ def admitted_together(
 
 
 def mattering(name: str, force: float, rate: float) -> float:
-    """Size of a friction parameter below which it does not matter (N m, or N m s/rad).
+    """Size of a friction parameter below which it is irrelevant (N m, or N m s/rad).
 
-    force, rate: the largest that were recorded (N m, rad/s).
+    force, rate: the largest recorded ones (N m, rad/s).
     """
     return MATTERS * force / (rate if name.startswith("viscous") else 1.0)
 
 
 def refused(estimate: Estimate, reason: Reason) -> Estimate:
-    """Not determined, with value and interval as they are: a reader sees how little they say."""
+    """Not determined, with unchanged value and interval, so that a reader sees the uncertainty."""
     return replace(estimate, origin=Origin.NOT_DETERMINED, reason=reason)
 
 
 def cannot_be_negative(name: str) -> bool:
-    """Whether no rig has a parameter of this name below zero."""
+    """Whether a parameter of this name is nonnegative on every rig."""
     words = set(name.split("_"))
     return name in FRICTION or (bool(words & NOT_NEGATIVE) and "over" not in words)
 
 
 def _is_negative(one: Estimate) -> bool:
-    """Whether all of its interval lies where no rig has it; or its value, where it has none."""
+    """Whether a nonnegative parameter has a negative interval, or value without an interval."""
     high = one.combined[1]
     return cannot_be_negative(one.name) and (one.value if high is None else high) < 0.0
 
 
 def _counterpart(name: str) -> str:
-    """The name of the other direction; the same name where there is none."""
+    """Name of the other direction; the same name where there is none."""
     swapped = {"positive": "negative", "negative": "positive"}
-    stem, _, way = name.rpartition("_")
-    return f"{stem}_{swapped[way]}" if way in swapped else name
+    stem, _, side = name.rpartition("_")
+    return f"{stem}_{swapped[side]}" if side in swapped else name
 
 
 def _likely(negative: set[str], found: Iterable[str]) -> Reason:

@@ -1,10 +1,10 @@
-"""A second slipping interface that the noise of a ramp hides from a single fit.
+"""A second slipping interface that is hidden by the noise of a ramp.
 
-An interface that is stiffer and slips first changes the rate of the early part of a ramp only.
-Where that part is not resolved by the gyro, the curve of one interface fits as well. Its stiffness
-is then too low as stiffness at rest, and too high as that of the interface that goes on deflecting:
-one that never gives until it slips at the torque Th leaves a rate that is exactly that of a single
-interface, with a stiffness Tb / (Tb - Th) times too high.
+An interface that is stiffer and slips first changes only the rate of the early part of a ramp. If
+the gyro does not resolve that part, the curve of one interface also fits. Its stiffness is then too
+low as stiffness at rest, and too high as that of the interface that continues to deflect. With a
+rigid interface that slips at the torque Th, the rate is exactly that of a single interface, with a
+stiffness that is too high by the factor Tb / (Tb - Th).
 """
 
 from __future__ import annotations
@@ -24,16 +24,15 @@ from campaign.estimation.presliding_curve import (
 )
 
 SHARES = (0.1, 0.15, 0.2, 0.3, 0.4)
-"""of all torque that a hidden interface is taken to carry. One of less is never resolved: half of
-the first lies before the first bin that is fitted. Of two that carry the same none is the strong
-one."""
+"""Shares of the torque of a hidden interface. A smaller share is never resolved: half of the first
+lies before the first fitted bin. With larger shares neither interface would be the stronger one."""
 EARLIER = (4.0, 6.0, 10.0, 20.0, 50.0, 300.0)
-"""How many times earlier (in angle) it slips. Two that are nearer bend as one does, and no ramp
-tells them apart; the last is as good as rigid."""
+"""Ratios of the slip angles of both interfaces. With smaller ratios no ramp separates them; the
+last one is almost rigid."""
 
 
 class Shift(NamedTuple):
-    """How far hidden interfaces may be from a fit's stiffness, as shares of it, not negative.
+    """Largest relative errors of a fit's stiffness by hidden interfaces, not negative.
 
     Attributes:
         stiffness: of the interface that carries the largest torque.
@@ -45,7 +44,7 @@ class Shift(NamedTuple):
 
 
 class _Candidate(NamedTuple):
-    """Squares that are left over, and both stiffnesses over that of the single interface."""
+    """Residual sum of squares, and both stiffnesses over that of the single interface."""
 
     squares: float
     stiffness: float
@@ -53,12 +52,12 @@ class _Candidate(NamedTuple):
 
 
 def hidden_shift(one: BristleFit) -> Shift:
-    """The largest shift among the pairs of interfaces that the data do not contradict.
+    """Largest shift among the pairs of interfaces that agree with the data.
 
-    Each pair of `SHARES` and `EARLIER` is fitted again. A pair is not contradicted when its squares
-    exceed the least of all by no more than Student's t squared times the residual variance (profile
-    likelihood: Venzon and Moolgavkar, Appl. Statist. 37, 1988), with residuals whitened as
-    `errors_of` found them.
+    Each pair of `SHARES` and `EARLIER` is refitted. A pair agrees with the data if its sum of
+    squares exceeds the least by at most Student's t squared times the residual variance (profile
+    likelihood: Venzon and Moolgavkar, Appl. Statist. 37, 1988), with residuals whitened by the
+    coefficient of `errors_of`.
     """
     alone = _fitted(one, 0.0, 1.0)
     pairs = [_fitted(one, share, earlier) for share, earlier in product(SHARES, EARLIER)]
@@ -73,10 +72,10 @@ def hidden_shift(one: BristleFit) -> Shift:
 
 
 def _fitted(one: BristleFit, share: float, earlier: float) -> _Candidate:
-    """A pair fitted to the bins of a single interface: one linear step.
+    """Fit of a pair to the bins of a single interface: one linear step.
 
-    At given `share` and `earlier` the rate is linear in the bias and in 1 / stiffness, and nearly
-    so in the logarithm of all torque.
+    At given `share` and `earlier` the rate is linear in the bias and in 1 / stiffness, and almost
+    linear in the logarithm of the total torque.
     """
     ((stiffness, torque),) = one.interfaces
     # The same late part of the curve, so that the step is small.

@@ -1,7 +1,7 @@
 """Intervals of means: over repeats, and over one autocorrelated recording.
 
-All are Student's t intervals. What a repetition would not change (a wrong torque constant, say) is
-in none of them: that is the systematic part of an estimate.
+All are Student's t intervals. They do not include errors common to all repetitions, such as that of
+the torque constant: these are the systematic part of an estimate.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
 
 LEVEL = 0.95
-"""Confidence of intervals, if nothing else is said."""
+"""Default confidence of intervals."""
 BATCHES = 10
-"""into which a recording is cut: enough for a deviation, few enough that neighbours hardly know of
-each other (AR(1) with 0.8 over 400 samples: 94 % coverage; with 20 batches 91 %)."""
+"""Batches of a recording: enough for a deviation, and so few that neighbors are almost uncorrelated
+(AR(1) with 0.8 over 400 samples: 94 % coverage; with 20 batches 91 %)."""
 TORQUE_CONSTANT = "torque constant"
-"""Source of the systematic part that all numbers in N m of a drive share."""
+"""Source of the systematic part that is common to all numbers in N m of a drive."""
 NO_FREEDOM = Cause("no degrees of freedom", "nothing is left over to judge its scatter by")
 SINGLE_VALUE = Cause("single value", "a single {what}: {others} would show how it scatters")
 TOO_FEW_SAMPLES = Cause("too few samples", "{samples} samples are too few for {batches} batches")
@@ -34,12 +34,12 @@ TOO_FEW_POSITIVE = Cause("too few positive values", "it takes two positive value
 WIDEST = 0.5 * math.log(1e3)
 """Largest half-width of an interval in the logarithm: a factor of a thousand from end to end."""
 LARGEST = 700.0
-"""Largest logarithm, either sign, whose exponential and multiples of it are still finite."""
+"""Largest absolute logarithm for which the exponential and multiples of it are finite."""
 SPANS_DECADES = Cause("spans decades", "its interval spans more than a factor of a thousand")
 
 
 def student(freedom: float, level: float = LEVEL) -> float:
-    """Quantile of Student's t for a two-sided interval; infinite freedom gives the normal one."""
+    """Quantile of Student's t for a two-sided interval; of the normal for infinite freedom."""
     from scipy.special import ndtri, stdtrit
 
     share = 0.5 + 0.5 * level
@@ -56,10 +56,10 @@ def with_error(
     quantile: float | None = None,
     **more: Any,
 ) -> Estimate:
-    """An estimate from its standard error and the degrees of freedom of that error.
+    """Estimate from its standard error and the degrees of freedom of that error.
 
-    No interval, and the reason, where there are no degrees of freedom or the error is not finite.
-    quantile: half-width over standard error; absent: Student's t.
+    Without an interval, with the reason, for no degrees of freedom or numbers that are not finite.
+    quantile: half-width over standard error; default: Student's t.
     """
     if not freedom > 0 or not math.isfinite(error) or not math.isfinite(value):
         return Estimate.without_interval(name, value, unit, NO_FREEDOM(), method=method, **more)
@@ -81,16 +81,16 @@ def with_error(
 def of_repeats(
     name: str, values: Sequence[float] | Array, unit: str, what: str = "repeats", **more: Any
 ) -> Estimate:
-    """Mean of independent values, e.g. of repeated trials, shape (n,); t with n - 1."""
-    found = np.asarray(values, dtype=float)
-    mean = float(np.mean(found))
-    if len(found) < 2:
+    """Mean of independent values, such as repeated trials, shape (n,); t with n - 1."""
+    repeats = np.asarray(values, dtype=float)
+    mean = float(np.mean(repeats))
+    if len(repeats) < 2:
         return Estimate.without_interval(
             name, mean, unit, SINGLE_VALUE(what="value", others=what), **more
         )
-    error = float(np.std(found, ddof=1)) / math.sqrt(len(found))
-    method = f"mean of {len(found)} {what}, Student's t"
-    return with_error(name, mean, unit, error, len(found) - 1, method, **more)
+    error = float(np.std(repeats, ddof=1)) / math.sqrt(len(repeats))
+    method = f"mean of {len(repeats)} {what}, Student's t"
+    return with_error(name, mean, unit, error, len(repeats) - 1, method, **more)
 
 
 def of_positive_repeats(
@@ -98,39 +98,38 @@ def of_positive_repeats(
 ) -> Estimate:
     """Geometric mean of independent positive values, shape (n,); t in the logarithm.
 
-    For sizes whose scatter is a share of them: the interval never reaches zero.
+    For quantities with a scatter proportional to their size: the interval never includes zero.
     Raises ValueError for values that are not positive.
     """
-    found = np.asarray(values, dtype=float)
-    if not np.all(found > 0):
+    positive = np.asarray(values, dtype=float)
+    if not np.all(positive > 0):
         raise ValueError(f"{name}: values must be positive")
-    inner = of_repeats(name, np.log(found), "", what, **more)
+    inner = of_repeats(name, np.log(positive), "", what, **more)
     return exponential(inner, unit)
 
 
 def of_next(name: str, values: Sequence[float] | Array, unit: str) -> Estimate:
-    """Where one further positive value will lie: prediction interval, t in the logarithm.
+    """Prediction interval of one further positive value, t in the logarithm.
 
-    The interval of a mean says where the mean is. One further value scatters as a single trial
-    does, and is to be held against their distribution: wider by sqrt(n + 1). The value is the
-    geometric mean of `values`, shape (n,). No interval for fewer than two values, or for some that
-    are not positive.
+    It includes the scatter of a single trial: it is wider than the interval of the mean by
+    sqrt(n + 1). The value is the geometric mean of `values`, shape (n,). No interval for fewer than
+    two values, or where a value is not positive.
     """
-    found = np.asarray(values, dtype=float)
-    if len(found) < 2 or not np.all(found > 0):
-        mean = float(np.mean(found)) if len(found) else math.nan
+    trials = np.asarray(values, dtype=float)
+    if len(trials) < 2 or not np.all(trials > 0):
+        mean = float(np.mean(trials)) if len(trials) else math.nan
         return Estimate.without_interval(name, mean, unit, TOO_FEW_POSITIVE())
-    logs, freedom = np.log(found), len(found) - 1
-    error = float(np.std(logs, ddof=1)) * math.sqrt(1.0 + 1.0 / len(found))
-    method = f"where one more trial will lie, from {len(found)}; Student's t in the logarithm"
+    logs, freedom = np.log(trials), len(trials) - 1
+    error = float(np.std(logs, ddof=1)) * math.sqrt(1.0 + 1.0 / len(trials))
+    method = f"where one more trial will lie, from {len(trials)}; Student's t in the logarithm"
     mean = float(np.mean(logs))
     return exponential(with_error(name, mean, "", error, freedom, method, kind="quantile"), unit)
 
 
 def exponential(logarithm: Estimate, unit: str) -> Estimate:
-    """The estimate of x from one of ln x; its standard error by the delta method.
+    """Estimate of x from an estimate of ln x; its standard error by the delta method.
 
-    *Not determined*, and without an interval, where that spans decades or x is beyond any size.
+    *Not determined*, and without an interval, where that spans decades or x overflows.
     """
     beyond = abs(logarithm.value) > LARGEST
     value = math.nan if beyond else math.exp(logarithm.value)
@@ -154,8 +153,8 @@ def exponential(logarithm: Estimate, unit: str) -> Estimate:
 def of_series(name: str, samples: Array, unit: str, **more: Any) -> Estimate:
     """Mean of an autocorrelated series of shape (n,) by batch means: t with `BATCHES` - 1.
 
-    Holds where the correlation is short against a batch; what is slower must be modelled. Source:
-    Schmeiser, "Batch size effects in the analysis of simulation output", Oper. Res. 30 (1982).
+    Valid for correlations shorter than a batch; slower effects need a model. Source: Schmeiser,
+    "Batch size effects in the analysis of simulation output", Oper. Res. 30 (1982).
     """
     if len(samples) < 2 * BATCHES:
         mean = float(np.mean(samples)) if len(samples) else math.nan
@@ -191,12 +190,12 @@ def ratio(name: str, one: Estimate, other: Estimate, unit: str = "", **more: Any
     errors = (one.standard_error / one.value, other.standard_error / other.value)
     freedom = welch((errors[0], one.freedom), (errors[1], other.freedom))
     error = math.hypot(*errors)
-    told = with_error(name, math.log(value), "", error, freedom, "ratio, Welch", **more)
-    return exponential(told, unit)
+    logarithm = with_error(name, math.log(value), "", error, freedom, "ratio, Welch", **more)
+    return exponential(logarithm, unit)
 
 
 def multiplied(estimate: Estimate, factor: float) -> Estimate:
-    """A number times a factor that is known exactly, with its interval; name and unit stay."""
+    """Estimate times an exact factor, with its interval; name and unit stay."""
 
     def times(value: float | None, by: float = abs(factor)) -> float | None:
         return None if value is None else value * by
@@ -217,7 +216,7 @@ def multiplied(estimate: Estimate, factor: float) -> Estimate:
 def welch(*parts: tuple[float, float | None]) -> float:
     """Degrees of freedom of a sum of independent errors, each (standard error, freedom).
 
-    None is infinitely many. Welch and Satterthwaite; GUM G.4.1.
+    A freedom of None is infinite. Welch and Satterthwaite; GUM G.4.1.
     """
     total = sum(error**2 for error, _ in parts)
     own = sum(error**4 / freedom for error, freedom in parts if freedom is not None)
@@ -227,6 +226,6 @@ def welch(*parts: tuple[float, float | None]) -> float:
 def shifted_by(
     estimate: Estimate, source: str, standard_uncertainty: float | None, *, of_rig: bool = False
 ) -> Estimate:
-    """The estimate with one more systematic part (1 sigma in its unit; None: not known)."""
+    """Estimate with an additional systematic part (1 sigma in its unit; None: unknown)."""
     part = Systematic(source, standard_uncertainty, of_rig)
     return replace(estimate, systematic=(*estimate.systematic, part))

@@ -1,7 +1,7 @@
 """Least squares on arrays: a small search between bounds, covariance, null directions, profiles.
 
-For functions that cost microseconds and know their derivatives; what is costly is fitted from
-several starts by `multi_start`.
+For fast functions (microseconds) with derivatives; `multi_start` fits slow functions from several
+starts.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from campaign.arrays import Array, Flags
 NULL = 1e-8
 """Singular values of the scaled Jacobian below this share of the largest are null."""
 INVOLVED = 0.1
-"""Component in a null direction from which on a parameter counts as left open by the data."""
+"""Component in a null direction above which the data do not determine a parameter."""
 
 
 def refuse_too_few(points: int, parameters: int) -> None:
-    """ValueError unless there are more points than parameters: else nothing shows the scatter."""
+    """Raise ValueError unless points outnumber parameters: otherwise the scatter is unknown."""
     if points <= parameters:
         raise ValueError(
             f"{points} points cannot determine {parameters} parameters and their scatter; "
@@ -30,14 +30,14 @@ def refuse_too_few(points: int, parameters: int) -> None:
 
 
 def covariance(jacobian: Array, null: float = NULL, flat: float = 0.0) -> tuple[Array, Flags]:
-    """(JᵀJ)⁻¹ without null directions, shape (k, k), and which parameters these involve, (k,).
+    """(JᵀJ)⁻¹ without null directions, shape (k, k), and mask of the parameters in these, (k,).
 
-    Units of the parameters decide nothing: each column of J, shape (n, k), is scaled to length 1.
+    Independent of the parameters' units: each column of J, shape (n, k), is scaled to length 1.
 
     Args:
-        null: share of the largest singular value of that below which a direction is null.
-        flat: share of the longest column below which one is null whatever its direction, where
-            parameters have comparable units.
+        null: share of the largest singular value below which a direction is null.
+        flat: share of the longest column below which a column is null, for parameters of comparable
+            units.
     """
     length = np.linalg.norm(jacobian, axis=0)
     nothing = length <= flat * float(length.max(initial=0.0))
@@ -51,7 +51,7 @@ def covariance(jacobian: Array, null: float = NULL, flat: float = 0.0) -> tuple[
 
 
 def straight_line(values: Array) -> Array:
-    """The straight line through values at even intervals, shape (n,)."""
+    """Straight line through evenly spaced values, shape (n,)."""
     place = np.linspace(-1.0, 1.0, len(values))
     return np.asarray(values.mean() + place * (place @ values) / (place @ place))
 
@@ -65,19 +65,19 @@ def gradients(function: Callable[[Array], Array], point: Array, steps: Array) ->
 def propagated(by: Array, covariance: Array) -> Array:
     """Standard deviations of numbers by the delta method, shape (k,) (GUM 5.2.2).
 
-    by: their derivatives by parameters of that covariance (p, p), shape (k, p).
+    by: their derivatives by the parameters, shape (k, p); covariance of the parameters: (p, p).
     """
     return np.asarray(np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", by, covariance, by), 0.0)))
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where a sum of squares is smallest between bounds.
+    """Minimum of a sum of squares between bounds.
 
     Attributes:
         point: shape (k,).
-        residuals, jacobian: there, shapes (n,) and (n, k).
-        held: parameters that lie at a bound and would go beyond it, shape (k,).
+        residuals, jacobian: at the point, shapes (n,) and (n, k).
+        held: mask of parameters at a bound with the descent beyond it, shape (k,).
     """
 
     point: Array
@@ -98,14 +98,14 @@ def minimum(
     upper: Array,
     steps: int = 100,
 ) -> Minimum:
-    """Smallest sum of squares between bounds: Levenberg and Marquardt, steps cut off at a bound.
+    """Minimize a sum of squares between bounds: Levenberg-Marquardt, steps cut off at a bound.
 
     For small problems with a derivative: a tenth of the time of `scipy.optimize.least_squares`,
-    most of which goes into its own bookkeeping.
+    which is mostly overhead.
 
     Args:
         function: residuals (n,) and their Jacobian (n, k) at a point (k,).
-        lower, upper: shape (k,); equal ones hold a parameter.
+        lower, upper: shape (k,); equal bounds fix a parameter.
     """
     point = np.clip(start, lower, upper)
     residuals, jacobian = function(point)
@@ -143,7 +143,7 @@ def minimum(
 
 
 def _held(point: Array, gradient: Array, lower: Array, upper: Array) -> Flags:
-    """Which parameters are at a bound with the descent leading beyond it."""
+    """Mask of the parameters at a bound with the descent beyond it."""
     return ((point <= lower) & (gradient >= 0)) | ((point >= upper) & (gradient <= 0))
 
 
@@ -155,19 +155,19 @@ def profile_limit(
     accuracy: float = 1e-6,
     doublings: int = 60,
 ) -> float:
-    """Where a profile of the sum of squares has risen by `most` above its value at `start`.
+    """Value at which a profile of the sum of squares is `most` above that at `start`.
 
     Args:
-        cost_at: smallest sum of squares with the parameter held at a value.
-        step: first step away from `start`, with its sign; doubled until the rise is passed.
-        accuracy: of the limit, as a share of it.
-        doublings: at most.
+        cost_at: smallest sum of squares with the parameter fixed at a value.
+        step: first step from `start`, with its sign; doubled until the rise exceeds `most`.
+        accuracy: relative accuracy of the limit.
+        doublings: largest number of doublings.
 
-    Raises ValueError where it never rises so far: the data give no limit on that side.
+    Raises ValueError where the rise is smaller: the data give no limit on that side.
     """
     from scipy.optimize import brentq
 
-    cost_at = cache(cost_at)  # the ends are asked for by the search between them again
+    cost_at = cache(cost_at)  # the search evaluates both ends again
     bottom = cost_at(start)
     inner, outer = start, start + step
     for _ in range(doublings):
@@ -176,5 +176,5 @@ def profile_limit(
         inner, outer = outer, start + 2.0 * (outer - start)
     else:
         raise ValueError("the data give no limit on that side")
-    found = brentq(lambda x: cost_at(x) - bottom - most, inner, outer, rtol=accuracy)
-    return float(found)
+    limit = brentq(lambda x: cost_at(x) - bottom - most, inner, outer, rtol=accuracy)
+    return float(limit)

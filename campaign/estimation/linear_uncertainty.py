@@ -1,7 +1,7 @@
 """Intervals, correlations and undetermined directions of a least-squares fit.
 
-Linearised at the optimum; parameters are shares of their ranges (`unknowns`), and the residuals'
-deviations are taken as independent.
+Linearized at the optimum. Parameters are shares of their ranges (`unknowns`); the residuals are
+assumed to be independent.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from campaign.reason import Cause
 
 Bound = Literal["", "lower", "upper"]
 AT_BOUND = 1e-3
-"""Share of its range within which a parameter is at its bound."""
+"""Distance from its bound, as a share of its range, within which a parameter is at the bound."""
 NEGLIGIBLE = 1e-6
 """Singular values of the scaled Jacobian below this share of the largest are null."""
 MOST_STEPS = 100
-"""of one bounded linear fit; it needs about as many as there are parameters."""
+"""Most steps of one bounded linear fit, which needs about one for each parameter."""
 METHOD = "least squares, linearised at the optimum"
 INTERRUPTED = Cause("fit interrupted", "the fit was interrupted")
 NO_LIMIT = Cause(
@@ -41,22 +41,21 @@ NOT_DETERMINED = Cause(
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """In shares of the parameters' ranges; arrays of shape (k,).
+    """Uncertainty of parameters, in shares of their ranges; arrays of shape (k,).
 
     Attributes:
-        half_width: of the 95 % intervals, NaN at a bound and where nothing can be said. It takes
-            those at a bound as known there: too narrow by what they are not.
-        low, high: ends of the intervals that hold whether or not others are at a bound: of
-            `half_width`, moved as far as those could move them, up to their `limit`, or to their
-            other bound where there is none.
+        half_width: of the 95 % intervals, NaN at a bound and for undetermined parameters. It takes
+            parameters at a bound as fixed, and so does not include their uncertainty.
+        low, high: ends of the intervals that include it: from `half_width`, shifted by the largest
+            effect of parameters at a bound, up to their `limit` or their other bound.
         bound: `lower` or `upper` for a parameter that ended there.
-        limit: of a parameter at its bound: up to which share of its range it may still be (95 %,
-            one-sided); NaN for the others, and where there is no limit before the other bound.
-        open: parameters that the data do not determine: no residual depends on them, they can only
-            be told together with others, or their interval is wider than their range.
+        limit: one-sided 95 % limit of a parameter at its bound, as a share of its range; NaN for
+            other parameters, and without a limit before the other bound.
+        open: parameters that the data do not determine: no residual depends on them, only a
+            combination with others is determined, or their interval is wider than their range.
         correlation: shape (k, k); NaN where a parameter has no interval.
-        scatter: by which the stated standard deviations were multiplied, at least 1; where none
-            were stated, the residuals' standard deviation.
+        scatter: factor of the stated standard deviations, at least 1; without stated ones, the
+            residuals' standard deviation.
         freedom: residuals less parameters that are not at a bound.
     """
 
@@ -72,9 +71,9 @@ class Uncertainty:
 
     @property
     def covariance(self) -> Array | None:
-        """Of the shares, shape (k, k), scaled by `scatter`; None where one is not determined.
+        """Covariance of the shares, shape (k, k), scaled by `scatter`; None if one is open.
 
-        A parameter at its bound counts as known there.
+        A parameter at its bound counts as fixed.
         """
         if self.freedom <= 0 or any(self.open):
             return None
@@ -85,18 +84,17 @@ class Uncertainty:
 def uncertainty(
     jacobian: Array, residuals: Array, shares: Array, loss: Loss, *, stated: bool = True
 ) -> Uncertainty:
-    """The uncertainty of a fit.
+    """Uncertainty of a fit.
 
-    Residuals count with the weight their loss gave them. When they are larger than the standard
-    deviations that were stated, these are widened to fit (by the root of chi-square over degrees
-    of freedom); they are never narrowed.
+    Residuals have the weight of their loss. If they are larger than the stated standard deviations,
+    these are increased (by the root of chi-square over degrees of freedom), never reduced.
 
     Args:
         jacobian: of the residuals by the shares, shape (n, k).
         residuals: in standard deviations, shape (n,).
         shares: the optimum, shape (k,).
-        loss: that the fit made smallest.
-        stated: false where residuals are not in stated deviations: their own size is all there is.
+        loss: loss function of the fit.
+        stated: false for residuals without stated deviations: their size determines the deviation.
     """
     n, k = jacobian.shape
     bound = tuple(_bound(share) for share in shares)
@@ -122,7 +120,7 @@ def uncertainty(
         unknown |= 2 * np.nan_to_num(half) > 1.0
         with np.errstate(invalid="ignore", divide="ignore"):
             correlation[np.ix_(free, free)] = inverse / np.outer(sigma, sigma)
-        # What the others do when those at a bound go as far as they may.
+        # Shift of the free parameters when those at a bound move to their limits.
         moved = -inverse @ weighted[:, free].T @ (weighted * _reach(shares, limit))[:, ~free]
         down[free], up[free] = moved.clip(max=0).sum(axis=1), moved.clip(min=0).sum(axis=1)
     low, high = shares - half + down, shares + half + up
@@ -131,18 +129,18 @@ def uncertainty(
 
 
 def _reach(shares: Array, limit: Array) -> Array:
-    """How far each may be from its bound, with its sign, shape (k,); of those at a bound."""
+    """Signed distance of parameters at a bound to their limit or other bound, shape (k,)."""
     other_bound = np.where(shares < 0.5, 1.0, 0.0)
     return np.asarray(np.where(np.isnan(limit), other_bound, limit) - shares)
 
 
 def _limit(jacobian: Array, residuals: Array, shares: Array, index: int, rise: float) -> float:
-    """Share up to which a parameter at its bound may be, by profile likelihood; NaN without end.
+    """Limit (share) of a parameter at its bound, by profile likelihood; NaN without a limit.
 
-    There the sum of squares of the linearised residuals, the others fitted anew between their
-    bounds, has risen by `rise`: the square of the two-sided quantile. The one-sided one is for
-    those who always ask for one side. Here the data choose between one side and two, and both kinds
-    of intervals together would hold some truths in 92.5 of 100 repetitions only.
+    At the limit the sum of squares of the linearized residuals, with the other parameters refitted
+    within their bounds, has risen by `rise`: the square of the two-sided quantile. The one-sided
+    quantile is not valid, because the data decide between a one-sided and a two-sided interval:
+    coverage of both together would be only 92.5 % for some true values.
     """
     from scipy.optimize import lsq_linear
 
@@ -166,11 +164,11 @@ def _limit(jacobian: Array, residuals: Array, shares: Array, index: int, rise: f
 def estimate_of(
     unknown: Unknown, share: float, certainty: Uncertainty | None, index: int, unit: str
 ) -> Estimate:
-    """One parameter with its interval, or why it has none.
+    """Estimate of one parameter with its interval, or the reason for none.
 
     Args:
         share: the optimum, as a share of the range.
-        certainty: None where the fit was interrupted.
+        certainty: None after an interrupt of the fit.
         index: of the parameter in `certainty`.
         unit: of its value (SI).
     """
@@ -213,7 +211,7 @@ def estimate_of(
 def strong(
     correlation: Array, names: Sequence[str], least: float = 0.9
 ) -> list[tuple[str, str, float]]:
-    """Pairs of parameters that the data can hardly tell apart, the strongest first."""
+    """Pairs of strongly correlated parameters with their correlation, the strongest first."""
     k = len(names)
     pairs = [
         (names[i], names[j], float(correlation[i, j]))

@@ -1,18 +1,17 @@
 """A response between its measured points: log L over log frequency, with errors.
 
-The logarithm of an open loop is smooth where the closed loop may have a resonance, and its real
-part (log magnitude) and imaginary part (phase) have the same error where it is noise; they are
-taken to have it where friction scatters, too, which moves the phase of small motions by more. All
-that is read between points is read from here, so that noise and interpolation are judged in one
-place.
+The logarithm of an open loop is smooth, also where the closed loop has a resonance. Noise causes
+the same error of its real part (log magnitude) and imaginary part (phase). The same is assumed for
+the scatter of friction, although that shifts the phase of small motions more. All readings between
+points use this module, so that noise and interpolation are estimated in one place.
 
-The curve is taken for a parabola and a random function with a Matérn covariance of order 3/2:
-continuous, with a slope, and no more, because friction, small modes and an amplitude that begins to
-fall bend a response more sharply than polynomials show. How large the random part is, over which
-length it changes, and by how much a point deviates beside its own noise (friction differs from
-trial to trial) follows from the points around: every combination counts by its likelihood, so that
-what is not known of them widens the interval (Rasmussen and Williams, "Gaussian Processes for
-Machine Learning" (2006), sections 2.7, 4.2 and 5.4).
+The model is a parabola plus a random function with a Matérn covariance of order 3/2, which has a
+slope but no curvature: friction, small modes and an amplitude that begins to fall bend a response
+more sharply than polynomials. The points around a place determine three parameters: size and length
+of the random part, and the scatter of points beside their noise (friction differs between trials).
+Every combination has its likelihood as weight, so that their uncertainty widens the interval
+(Rasmussen and Williams, "Gaussian Processes for Machine Learning" (2006), sections 2.7, 4.2 and
+5.4).
 """
 
 from __future__ import annotations
@@ -30,28 +29,28 @@ from campaign.estimation.frequency_response import Response
 WIDEST = 1.3
 """Half-width of a fit's window, in the logarithm of frequency: a factor of 3.7."""
 MOST = 9
-"""Points that a fit takes at most, the nearest: a curve is as smooth as it is there. Of 24 points,
-0.5 Hz apart, some lie on a mode at 11 Hz, and made an interval at 7 Hz 28 times as wide."""
+"""Most points of a fit, the nearest, because smoothness is local. Of 24 points, 0.5 Hz apart, some
+lie on a mode at 11 Hz, and made an interval at 7 Hz 28 times as wide."""
 FEWEST = 2
-"""Points below which nothing is read between them."""
+"""Fewest points for a reading."""
 TREND = 3
-"""Coefficients of the parabola, for which any value is as likely as any other."""
+"""Coefficients of the parabola, with a flat prior."""
 LENGTHS = np.geomspace(0.15, 4.0, 6)
-"""over which the random part may change, in the logarithm of frequency."""
+"""Lengths of the random part, in the logarithm of frequency."""
 SIZES = np.geomspace(1e-5, 3.0, 14)
-"""Standard deviations that the random part may have, in log L."""
+"""Standard deviations of the random part, in log L."""
 SCATTERS = (0.0, *2e-4 * 2.0 ** np.arange(11))
-"""Standard deviations that log L may have from point to point beside the noise of each."""
+"""Standard deviations of log L between points, besides the noise of each."""
 EXACT = 1e-6
-"""Standard deviation of log L below which no point is known: what a factorisation resolves."""
+"""Least standard deviation of log L of a point: the resolution of the factorization."""
 NEGLIGIBLE = 0.01
-"""Likelihood over the largest below which a combination does not count."""
+"""Likelihood over the largest below which a combination is not used."""
 FRICTION = 5e-4
-"""Standard deviation of log L that no spread of the points shows: friction answers to the noise of
-the sensors, too, so that a loop with noise lags behind one without. On 21 benches with friction its
-phase did by 0.5e-4 to 6.5e-4 rad."""
+"""Standard deviation of log L that the scatter of points does not show: friction responds to sensor
+noise, so that a loop with noise has a larger lag: on 21 benches with friction by 0.5e-4 to 6.5e-4
+rad of phase."""
 STEPS = 64
-"""into which the place of a crossing is cut before it is refined."""
+"""Steps of the place of a crossing before its refinement."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +60,12 @@ class LocalFit:
     Attributes:
         centre: log frequency of that place.
         points: log frequency less `centre`, shape (n,).
-        share: of each process in the mean, its likelihood, shape (g,).
+        share: weight of each process in the mean, its likelihood, shape (g,).
         length, size: of its random part, shape (g,).
-        scatter: variance of each point beside its noise, shape (g,).
+        scatter: variance of each point besides its noise, shape (g,).
         noise: variance of each point by its own noise, shape (n,).
         trend: complex coefficients of the parabola, lowest power first, shape (g, q).
-        rest: inverse of the covariance times what the parabola leaves, complex, shape (g, n).
+        rest: inverse covariance times residuals of the parabola, complex, shape (g, n).
         inverse: of the covariance of the points, shape (g, n, n).
         information: on the coefficients, HᵀK⁻¹H, shape (g, q, q).
     """
@@ -90,8 +89,8 @@ class LocalFit:
     def at(self, log_frequency: float) -> tuple[complex, complex, float, float]:
         """Log L, its slope, and the standard deviations of each of its two parts.
 
-        The first is what noise does to it, the second what the curve may do between the points,
-        and what else these deviate by.
+        The first deviation is by noise, the second by the curve between the points and by their
+        scatter besides noise.
         """
         step = 1e-4
         x = log_frequency - self.centre + step * np.array([-1.0, 0.0, 1.0])
@@ -114,20 +113,20 @@ class LocalFit:
         return complex(here), slope, math.sqrt(self.share @ noise), math.sqrt(gap)
 
     def sizes(self, loop: Response) -> Array:
-        """|L| at all points of the response, shape (k,), smoothed; as fitted where it is."""
+        """|L| at all points of the response, shape (k,): fitted within the fit's points."""
         x = np.log(loop.frequency) - self.centre
         inside = (x >= self.points[0]) & (x <= self.points[-1])
-        found = loop.size.copy()
-        found[inside] = np.exp(self.value(x[inside] + self.centre).real)
-        return found
+        smooth = loop.size.copy()
+        smooth[inside] = np.exp(self.value(x[inside] + self.centre).real)
+        return smooth
 
     def _means(self, x: Array) -> ComplexArray:
-        """Of each process at `x`, shape (g, m)."""
+        """Mean of each process at `x`, shape (g, m)."""
         parabola = self.trend @ _powers(x, self.trend.shape[1]).T
         return np.asarray(parabola + np.einsum("gmn,gn->gm", self._covariance(x), self.rest))
 
     def _covariance(self, x: Array) -> Array:
-        """Between the random parts at `x` and at the points, shape (g, m, n)."""
+        """Covariance of the random parts at `x` and at the points, shape (g, m, n)."""
         apart = np.abs(x[:, None] - self.points)
         return np.asarray(self.size[:, None, None] ** 2 * _matern(apart, self.length))
 
@@ -143,12 +142,11 @@ def _matern(distance: Array, length: Array) -> Array:
 
 
 def fitted(loop: Response, at: float, size: Array | None = None) -> LocalFit:
-    """The curve around `at` (log frequency), from the points nearest to it.
+    """Fit of the curve around `at` (log frequency), from the points nearest to it.
 
-    `size`: of |L| at the points, by which their errors count; absent: as measured, smoothed.
-    Its parts are told by the likelihood of what the points say beside any parabola (restricted
-    likelihood); all sizes and lengths are as likely beforehand as their neighbours on the grid.
-    Raises ValueError for fewer than `FEWEST` points.
+    `size`: |L| at the points, for their relative errors; default: the size of the response.
+    Restricted likelihood (without the parabola) weights the parameters of the random part; their
+    prior is uniform on the grid. Raises ValueError for fewer than `FEWEST` points.
     """
     if len(loop.frequency) < FEWEST:
         raise ValueError(f"fewer than {FEWEST} points")
@@ -175,7 +173,7 @@ def fitted(loop: Response, at: float, size: Array | None = None) -> LocalFit:
     trend = np.linalg.solve(information, across)
     left = np.trace(square[..., q:, q:], axis1=-2, axis2=-1) - np.sum(across * trend, axis=(-2, -1))
     spread = np.sum(np.log(variance), axis=1)[:, None] - np.sum(np.log(shrink), axis=-1)
-    # Two parts: the determinants count twice, the halves go.
+    # Real and imaginary part: the determinants count twice, without the factor 1/2.
     likelihood = -0.5 * left - spread - np.linalg.slogdet(information)[1]
     share = np.exp(likelihood - np.max(likelihood))
     pair, which = np.nonzero(share > NEGLIGIBLE)
@@ -200,13 +198,12 @@ def fitted(loop: Response, at: float, size: Array | None = None) -> LocalFit:
 
 @dataclass(frozen=True)
 class Reading:
-    """A place at which log L meets a condition, and a number read there.
+    """Log frequency at which log L meets a condition, and a value there.
 
     Attributes:
-        log_frequency, value: as read.
-        frequency_error, value_error: standard deviations from noise.
-        frequency_gap, value_gap: standard deviations from what lies between the points, and from
-            friction.
+        log_frequency, value: the two numbers.
+        frequency_error, value_error: standard deviations by noise.
+        frequency_gap, value_gap: standard deviations by interpolation and friction.
     """
 
     log_frequency: float
@@ -218,16 +215,15 @@ class Reading:
 
 
 Quantity = Callable[[ComplexArray], Array]
-"""A real number of log L, e.g. its imaginary part; analytic: the real part of a function of it."""
+"""Real function of log L, such as its imaginary part; the real part of an analytic function."""
 
 
 def read(
     loop: Response, place: tuple[float, float], zero: Quantity, value: Quantity
 ) -> Reading | None:
-    """Where `zero` of log L vanishes between two log frequencies, and `value` there.
+    """Zero of `zero` of log L between two log frequencies, and `value` there.
 
-    None where a local fit does not vanish in or next to that place. Raises ValueError for too few
-    points.
+    None where a local fit has no zero in or next to `place`. Raises ValueError for too few points.
     """
     rough = fitted(loop, 0.5 * (place[0] + place[1]))
     at = _vanishing(rough, place, zero)
@@ -244,7 +240,7 @@ def read(
 
 
 def _vanishing(fit: LocalFit, place: tuple[float, float], zero: Quantity) -> float | None:
-    """Where `zero` vanishes nearest to the middle of `place`, a place's width around it."""
+    """Zero of `zero` nearest to the middle of `place`, searched one width beyond both ends."""
     low, high = place
     middle, width = 0.5 * (low + high), max(high - low, 1e-3)
     grid = np.linspace(low - width, high + width, 3 * STEPS)
@@ -254,9 +250,9 @@ def _vanishing(fit: LocalFit, place: tuple[float, float], zero: Quantity) -> flo
         if not at.size:
             return None
         share = level[at] / (level[at] - level[at + 1])
-        found = grid[at] + share * (grid[at + 1] - grid[at])
-        best = int(np.argmin(np.abs(found - middle)))
-        middle = float(found[best])
+        zeros = grid[at] + share * (grid[at + 1] - grid[at])
+        best = int(np.argmin(np.abs(zeros - middle)))
+        middle = float(zeros[best])
         step = grid[1] - grid[0]
         grid = np.linspace(grid[at[best]] - 1e-3 * step, grid[at[best] + 1] + 1e-3 * step, 9)
     return middle
@@ -265,16 +261,16 @@ def _vanishing(fit: LocalFit, place: tuple[float, float], zero: Quantity) -> flo
 def _sensitivity(
     logarithm: complex, slope: complex, zero: Quantity, value: Quantity
 ) -> tuple[float, float, float]:
-    """`value` there, and how an error of log L moves the log frequency and the value.
+    """`value`, and the factors from an error of log L to those of log frequency and value.
 
-    Of the same standard deviation in both parts of log L, and independent.
+    For independent errors of the same standard deviation in both parts of log L.
     """
     step = 1e-6
     moved = np.array([logarithm, logarithm + step, logarithm + 1j * step])
 
     def gradient(quantity: Quantity) -> tuple[float, float, float]:
-        told = quantity(moved)
-        return float(told[0]), float(told[1] - told[0]) / step, float(told[2] - told[0]) / step
+        at = quantity(moved)
+        return float(at[0]), float(at[1] - at[0]) / step, float(at[2] - at[0]) / step
 
     _, zero_re, zero_im = gradient(zero)
     number, value_re, value_im = gradient(value)

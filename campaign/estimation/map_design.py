@@ -36,7 +36,7 @@ RIDGE = 1e-9
 def telling_speeds(
     curves: Sequence[Mapping[str, float]], measured: Array, candidates: Array, count: int
 ) -> Array:
-    """The speeds (rad/s) at which further points tell most, rising; shape (at most `count`,).
+    """Most informative speeds (rad/s) of further points, ascending; shape (at most `count`,).
 
     Args:
         curves: parameters of Equation 4.6 by name (SI), any of which may be the true one.

@@ -1,8 +1,8 @@
 """Least squares from several starts; Ctrl-C keeps the best point.
 
     objective = Objective(unknowns, residuals)
-    found = search(objective, Settings(starts=8))
-    found.values, found.agreeing, found.estimates({"inertia": "kg m^2"})
+    result = search(objective, Settings(starts=8))
+    result.values, result.agreeing, result.estimates({"inertia": "kg m^2"})
 
 Each fit is `scipy.optimize.least_squares`: trust region reflective, between bounds.
 """
@@ -22,27 +22,27 @@ from campaign.estimation.objective import Objective
 from campaign.estimation.unknowns import Unknown, values_at
 
 AGREE = 0.01
-"""Costs of starts that found the same optimum differ by less than this share."""
+"""Largest relative difference in cost of starts that end at the same optimum."""
 EXACT = 1e-9
-"""Share of the cost at the start below which residuals of no stated deviation count as none."""
+"""Share of the start cost below which residuals without a stated deviation count as zero."""
 MARGIN = 0.05
-"""Share of each range, from its ends, in which no random start lies."""
+"""Share of each range at both ends without random starts."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a search is done.
+    """Settings of a search.
 
     Attributes:
-        starts: how many fits; the first from where the unknowns start, the others at random. With
-            0 nothing is fitted, and the point where the unknowns start is linearised.
+        starts: number of fits; the first from the start of the unknowns, the others at random. With
+            0 there is no fit, and the start of the unknowns is linearized.
         seed: of the random starts.
-        loss: how a residual counts.
+        loss: loss function of a residual.
         tolerance: relative change of cost or shares below which a fit has converged.
-        max_evaluations: steps of each fit at most; those for derivatives are not counted.
-        stated: whether residuals are in standard deviations that were stated, which are widened
-            where the residuals are larger and never narrowed; otherwise their size is all that is
-            known of the deviation, and their unit decides nothing.
+        max_evaluations: most evaluations of each fit, without those for derivatives.
+        stated: whether residuals are in stated standard deviations, which are increased where the
+            residuals are larger and never reduced; otherwise the residuals alone determine the
+            deviation, and their unit is arbitrary.
     """
 
     starts: int = 4
@@ -59,13 +59,13 @@ class Settings:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a search is.
+    """Progress of a search.
 
     Attributes:
-        phase: what is being done, e.g. `start 2 of 4`.
-        evaluations: of the residuals so far, those for differences included.
+        phase: current phase, such as `start 2 of 4`.
+        evaluations: of the residuals so far, including those for differences.
         cost: of the latest step of this phase.
-        best: the lowest cost of this phase and those like it.
+        best: lowest cost so far.
     """
 
     phase: str
@@ -83,12 +83,12 @@ def no_display(progress: Progress) -> None:
 
 @dataclass(frozen=True)
 class Start:
-    """One fit.
+    """Fit from one start.
 
     Attributes:
         begin, end: shares of the unknowns' ranges, shape (k,).
         cost: at the end.
-        reason: why it ended there.
+        reason: why it ended.
     """
 
     begin: Array
@@ -99,7 +99,7 @@ class Start:
 
 @dataclass
 class Lowest:
-    """The best point seen: its cost, shares (k,) and residuals (n,)."""
+    """Best point so far: its cost, shares (k,) and residuals (n,)."""
 
     cost: float = np.inf
     shares: Array = field(default_factory=lambda: np.empty(0))
@@ -113,17 +113,17 @@ class Lowest:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What a search found.
+    """Result of a search.
 
     Attributes:
-        unknowns, settings: what was fitted, and how.
-        shares: the best point seen, in shares of their ranges, shape (k,).
-        cost, residuals: there; residuals of shape (n,).
+        unknowns, settings: inputs of the search.
+        shares: best point, in shares of the unknowns' ranges, shape (k,).
+        cost, residuals: at the best point; residuals of shape (n,).
         cost_before: at the unknowns' start.
-        starts: the fits that came to their end, in order.
+        starts: the completed fits, in order.
         jacobian: of the residuals by the shares at the best point, shape (n, k).
-        uncertainty: of the shares there; it and `jacobian` are None where it was interrupted.
-        interrupted: whether somebody stopped it.
+        uncertainty: of these shares; it and `jacobian` are None after an interrupt.
+        interrupted: whether the user stopped the search.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -139,17 +139,17 @@ class SearchResult:
 
     @property
     def values(self) -> dict[str, float]:
-        """The best point, SI, by name."""
+        """Best point, SI, by name."""
         names = [unknown.name for unknown in self.unknowns]
         return dict(zip(names, values_at(self.unknowns, self.shares), strict=True))
 
     @property
     def agreeing(self) -> int:
-        """How many starts ended as low as the best one."""
+        """Number of starts that ended as low as the best one."""
         return agreeing(self.starts, 1.0 if self.settings.stated else EXACT * self.cost_before)
 
     def estimates(self, units: Mapping[str, str]) -> dict[str, Estimate]:
-        """The unknowns with their intervals, by name; `units`: SI units by name."""
+        """Estimates of the unknowns, by name; `units`: SI units by name."""
         return {
             unknown.name: estimate_of(
                 unknown, float(share), self.uncertainty, index, units.get(unknown.name, "")
@@ -159,9 +159,9 @@ class SearchResult:
 
 
 def search(objective: Objective, settings: Settings, display: Display = no_display) -> SearchResult:
-    """Fit from every start, then linearise at the best point.
+    """Fit from every start, then linearize at the best point.
 
-    A KeyboardInterrupt after the first evaluation ends it with the best point so far.
+    A KeyboardInterrupt after the first evaluation ends the search with the best point so far.
     """
     begin = objective.start
     residuals = objective.at(begin)
@@ -205,27 +205,27 @@ def fit_from(
     lowest: Lowest | None = None,
     used: Flags | None = None,
 ) -> Start:
-    """One fit.
+    """Fit from one start.
 
     Args:
         begin: shares, shape (k,).
-        lowest: keeps the best point seen, and is told of every step.
-        used: which residuals count, shape (n,); all when absent.
+        lowest: best point, updated at every step.
+        used: mask of the residuals that count, shape (n,); default: all.
     """
     from scipy.optimize import least_squares
 
     seen = Lowest() if lowest is None else lowest
     rows = slice(None) if used is None else used
     first = np.clip(begin, 0.0, 1.0)
-    # One of the tolerances is absolute: residuals in any unit are made of order 1.
+    # One tolerance is absolute: residuals of arbitrary unit are scaled to order 1.
     size = 1.0 if settings.stated else float(np.linalg.norm(objective.at(first)[rows])) or 1.0
 
     def residuals(shares: Array) -> Array:
-        found = objective.at(shares)[rows]
-        now = cost(settings.loss, found)
-        seen.see(now, shares, found)
+        errors = objective.at(shares)[rows]
+        now = cost(settings.loss, errors)
+        seen.see(now, shares, errors)
         display(Progress(phase, objective.evaluations, now, seen.cost))
-        return found / size
+        return errors / size
 
     solution = least_squares(
         residuals,
@@ -244,17 +244,17 @@ def fit_from(
 
 
 def make_starts(first: Array, count: int, seed: int) -> list[Array]:
-    """`first`, then random points in the unit cube that only `seed` decides."""
+    """`first`, then random points in the unit cube, determined by `seed`."""
     random = np.random.Generator(np.random.PCG64(seed))
     others = MARGIN + (1 - 2 * MARGIN) * random.random((count - 1, len(first)))
     return [first, *others]
 
 
 def agreeing(starts: Sequence[Start], least: float = 1.0) -> int:
-    """How many starts ended as low as the best one.
+    """Number of starts that ended as low as the best one.
 
-    least: the cost that the difference is held against where the best one is lower: a residual of
-        about one standard deviation.
+    least: reference of the difference where the best cost is lower: by default the cost of a
+        residual of about one standard deviation.
     """
     if not starts:
         return 0

@@ -15,25 +15,25 @@ from campaign.estimation.stribeck import StribeckFit, fit_stribeck
 
 Counts = NDArray[np.signedinteger[Any]]
 LEAST = 1e-10
-"""relative deviation of a torque that is never undercut: exact data stay finite."""
+"""Least relative deviation of a torque, so that weights of exact data stay finite."""
 FEWEST_TO_SMOOTH = 6
-"""windows from which on the deviation of one is told better by all of them."""
+"""Fewest windows for a smoothing of their deviations."""
 ROUNDS = 20
-"""of fit and deviation in turn, at most; usually five."""
+"""Most iterations of fit and deviation; usually five."""
 SETTLED = 1e-3
-"""relative change of the deviation between points below which the rounds end."""
+"""Relative change of the deviation between points below which the iteration ends."""
 LIKELIER = 4.0
-"""Difference of twice the log-likelihoods from which on points tell which friction scatters."""
+"""Difference of twice the log-likelihoods that decides which part of friction scatters."""
 LEAST_DRY = 0.1
-"""Smallest part of a torque that scatters: beyond it, weights would rest on one fast point."""
+"""Smallest share of a torque that scatters: below it, weights would depend on one fast point."""
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """How points of a map deviate from its curve beyond what their windows show.
+    """Scatter between points of a map, beyond the errors of their windows.
 
     Attributes:
-        relative: deviation (1 sigma) of the part of friction that scatters.
+        relative: relative deviation (1 sigma) of the part of friction that scatters.
         steady_viscous: viscous friction that does not scatter (N m s/rad); 0: all friction does.
     """
 
@@ -41,22 +41,22 @@ class Scatter:
     steady_viscous: float
 
     def part(self, speed: Array | float, torque: Array | float) -> Array:
-        """The part of friction torques (N m) that scatters, shape of `torque`."""
+        """Part of friction torques (N m) that scatters, shape of `torque`."""
         return np.asarray(np.maximum(torque - self.steady_viscous * speed, LEAST_DRY * torque))
 
     def deviation(self, speed: Array | float, torque: Array | float) -> Array:
-        """From point to point (N m, 1 sigma), shape of `torque`."""
+        """Deviation between points (N m, 1 sigma), shape of `torque`."""
         return self.relative * self.part(speed, torque)
 
 
 def fit_with_scatter(
     speed: Array, torque: Array, window: Array
 ) -> tuple[tuple[Scatter, ...], StribeckFit]:
-    """How points of a direction scatter, and the fit with delta free, which depend on each other.
+    """Scatter of the points of a direction and fit with free delta, which depend on each other.
 
-    All friction scatters, or its dry part, whichever is likelier. Where neither clearly is, a point
-    deviates by the larger of the two: with weights of the wrong one, vs and Ts held in 92 of 100
-    maps. Arguments as those of `fit_direction`, shape (n,).
+    The more likely hypothesis applies: scatter of all friction or of its dry part. If neither is
+    clearly more likely, a point has the larger deviation of both: coverage of vs and Ts with the
+    wrong one is 92 %. Arguments as those of `fit_direction`, shape (n,).
     """
     (whole, fit), (dry, other) = (
         _fit_with(speed, torque, window, dry=dry) for dry in (False, True)
@@ -76,10 +76,10 @@ def _unlikely(found: StribeckFit) -> float:
 def _fit_with(
     speed: Array, torque: Array, window: Array, *, dry: bool
 ) -> tuple[Scatter, StribeckFit]:
-    """As `fit_with_scatter`, for friction that scatters as a whole, or in its dry part alone.
+    """As `fit_with_scatter`, for scatter of all friction, or of its dry part alone.
 
-    Where windows alone explain more than there is (in a closed loop they do), a common factor makes
-    chi-square equal to its degrees of freedom on that side, too.
+    Where windows alone overestimate the residuals (as in a closed loop), a common factor makes
+    chi-square equal to its degrees of freedom.
     """
     scatter = Scatter(1e-3, 0.0)
 
@@ -87,24 +87,24 @@ def _fit_with(
         between = scatter.deviation(speed, torque)
         return np.asarray(np.sqrt(window**2 + between**2 + (LEAST * torque) ** 2))
 
-    found = fit_stribeck(speed, torque, deviation())
+    curve = fit_stribeck(speed, torque, deviation())
     for _ in range(ROUNDS):
-        freedom, before = len(speed) - len(found.free), scatter.relative
-        scatter = Scatter(before, found.values["viscous_friction"] if dry else 0.0)
+        freedom, before = len(speed) - len(curve.free), scatter.relative
+        scatter = Scatter(before, curve.values["viscous_friction"] if dry else 0.0)
         part = scatter.part(speed, torque)
-        relative = between_deviation(found.residuals / part, window / part, freedom)
+        relative = between_deviation(curve.residuals / part, window / part, freedom)
         scatter = replace(scatter, relative=relative)
-        found = fit_stribeck(speed, torque, deviation(), start=found.values)
+        curve = fit_stribeck(speed, torque, deviation(), start=curve.values)
         if abs(relative - before) <= SETTLED * before:
             break
     if scatter.relative > 0:
-        return scatter, found
-    factor = math.sqrt(found.chi_square / (len(speed) - len(found.free)))
-    return scatter, replace(found, deviation=np.maximum(factor * found.deviation, LEAST * torque))
+        return scatter, curve
+    factor = math.sqrt(curve.chi_square / (len(speed) - len(curve.free)))
+    return scatter, replace(curve, deviation=np.maximum(factor * curve.deviation, LEAST * torque))
 
 
 def between_deviation(residuals: Array, window: Array, freedom: float) -> float:
-    """The common deviation beside `window` for which chi-square equals its degrees of freedom.
+    """Common deviation in addition to `window` for which chi-square equals its degrees of freedom.
 
     Sum of residual² / (window² + between²) = freedom; 0 where windows alone explain the residuals.
     All in one unit, or relative; arrays (n,). Paule and Mandel (1982).
@@ -123,14 +123,14 @@ def between_deviation(residuals: Array, window: Array, freedom: float) -> float:
 
 
 def smoothed_deviation(deviation: Array, place: Array) -> Array:
-    """Deviations of windows, each estimated from `BATCHES` means, told better by all together.
+    """Smoothed deviations of windows, each estimated from `BATCHES` means.
 
-    Each has an error of its own of 1 / sqrt(2 (BATCHES - 1)), a quarter, and weights that follow it
-    cost coverage. Their logarithms are drawn towards a parabola over `place`, by as much as their
-    scatter about it is explained by that error alone (Smyth, "Linear models and empirical Bayes
-    methods", Stat. Appl. Genet. Mol. Biol. 3 (2004), section 6.2).
+    Each has a relative error of 1 / sqrt(2 (BATCHES - 1)), a quarter; weights with this error
+    reduce coverage. The logarithms are shrunk towards a parabola over `place`, by the share of
+    their scatter that this error explains (Smyth, "Linear models and empirical Bayes methods",
+    Stat. Appl. Genet. Mol. Biol. 3 (2004), section 6.2).
 
-    deviation, place: shape (n,). What is not positive is unknown, and stays.
+    deviation, place: shape (n,). Values that are not positive are unknown and stay unchanged.
     """
     from scipy.special import polygamma, psi
 
@@ -152,14 +152,14 @@ def smoothed_deviation(deviation: Array, place: Array) -> Array:
 def lack_of_fit(
     torque: Array, level: Array, part: Array, member: Counts, residuals: Array, freedom: float
 ) -> float | None:
-    """p-value of the residuals of means against the scatter of repeats (F test), if there are any.
+    """F test of the residuals of means against the scatter of repeats: p value; None without any.
 
     Args:
         torque: of each point (N m), shape (m,).
-        level, residuals: mean torque of each place, and how far the curve is from it, shape (n,).
-        part: of each mean, what scatters and repeats differ in proportion to (N m), shape (n,).
-        member: to which place each point belongs, shape (m,).
-        freedom: places beyond the parameters of the curve.
+        level, residuals: mean torque of each place, and its distance from the curve, shape (n,).
+        part: part of each mean to which the scatter of repeats is proportional (N m), shape (n,).
+        member: index of the place of each point, shape (m,).
+        freedom: number of places less the parameters of the curve.
     """
     from scipy.special import fdtrc
 

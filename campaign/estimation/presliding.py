@@ -1,11 +1,11 @@
 """Presliding stiffness from a slow torque ramp (section 4.3.3).
 
-A straight chord through the curve of torque over angle is always too low as an estimate of sigma0,
-so the curve itself is fitted. It is not fitted to angles: an encoder has few counts in presliding,
-and an integrated gyro rate is a random walk, whose residuals would promise far too much. The mean
-rate of short bins is fitted instead, the standstill before the ramp included, which says what the
-gyro's bias is. The torque at which everything slips is left free: the breakaway torque of a ramp is
-not the curve's asymptote, and a stiffness that leans on it is 1 to 7 % wrong.
+The slope of a chord through the curve of torque over angle underestimates sigma0. Therefore the
+curve itself is fitted, but not to angles: an encoder has few counts in presliding, and an
+integrated gyro rate is a random walk, whose residuals result in much too small errors. The fit is
+to the mean rate of short bins, with the standstill before the ramp, which determines the bias of
+the gyro. The torque at which all interfaces slip is free: the breakaway torque of a ramp is not
+the curve's asymptote, and a stiffness based on it has an error of 1 to 7 %.
 """
 
 from __future__ import annotations
@@ -28,22 +28,21 @@ from campaign.estimation.torque_ramp import Ramp, ramp_of
 from campaign.reason import Cause
 
 WINDOWS = (0.5, 0.65, 0.8, 0.9)
-"""Shares of the breakaway torque at which the fitted window may end, to see how much that does."""
+"""Ends of fitted windows as shares of the breakaway torque, to estimate their influence."""
 SMALLEST_SHARE = 0.05
-"""of the breakaway torque: where the fit begins, since the load must first be accelerated and its
-bristles' damping be loaded; and what a second interface must carry to be believed."""
+"""Share of the breakaway torque at which the fit begins: before it, acceleration of the load and
+damping of the bristles dominate. Also the least torque of a second interface."""
 BENT = 0.3
-"""of its torque that the strongest interface must carry in a window."""
+"""Least share of its torque that the strongest interface must carry in a window."""
 NEAR = 0.16
-"""How far the share of another window may be for its stiffness to be told as a window's part."""
+"""Largest distance to the share of another window that counts in the systematic part."""
 SPLIT = 1.0 / 3.0
-"""By how much the angles of two weaker interfaces may lie apart, to either side, and be seen as
-one."""
+"""Relative distance of two slip angles from their mean, at which a fit sees a single interface."""
 CLEARLY = 10.0
-"""by which two interfaces must lower the Bayesian information criterion."""
+"""Least decrease of the Bayesian information criterion by a second interface."""
 APART = 2.0
-"""How much further the stronger interface must give way than the weaker: what is nearer is the
-model's own error, cut out of one curve."""
+"""Least ratio of the slip angle of the stronger interface to that of the weaker: with a smaller
+ratio the second interface is an error of the model, a part of one curve."""
 METHOD = "curve of bristles fitted to the gyro rate, its bias and the asymptote free"
 WINDOW = "window"
 """Source of the systematic part of where the fitted window ends."""
@@ -61,20 +60,20 @@ OFF_THE_CURVE = Cause(
 
 @dataclass(frozen=True)
 class Presliding:
-    """What one ramp says of the bristles.
+    """Bristle parameters from one ramp.
 
     Attributes:
         stiffness: of the interface that carries the largest torque (N m/rad); an upper bound where
             noise may hide a stiffer one that slips first.
-        stiffness_at_rest: slope before anything slips, the sum over all interfaces (N m/rad); then
-            a lower bound.
-        interfaces: that the curve shows, the one that carries the largest torque first.
+        stiffness_at_rest: slope before slip, the sum over all interfaces (N m/rad); a lower bound
+            in that case.
+        interfaces: of the fitted curve, the one that carries the largest torque first.
         bias: of the gyro (rad/s).
-        window: torques between which the curve was fitted (N m).
+        window: lower and upper torque of the fitted part of the curve (N m).
         chord: slope of a straight line through the same part of the curve (N m/rad).
-        by_window: stiffness when the window ends at other shares of the breakaway torque.
-        damping_shift: what 1 N m s/rad of bristle damping, which the curve leaves out, does to the
-            logarithms of stiffness and of stiffness at rest.
+        by_window: stiffness by the share of the breakaway torque at which the window ends.
+        damping_shift: change of the logarithms of stiffness and of stiffness at rest by 1 N m s/rad
+            of bristle damping, which the curve omits.
     """
 
     stiffness: Estimate
@@ -87,7 +86,7 @@ class Presliding:
     damping_shift: tuple[float, float]
 
     def with_damping(self, damping: float) -> Presliding:
-        """With the shift by a bristle damping (N m s/rad) that is only assumed, as systematic."""
+        """Add the shift by an assumed bristle damping (N m s/rad) as a systematic part."""
         shifts = [damping * shift for shift in self.damping_shift]
         return replace(
             self,
@@ -106,11 +105,10 @@ def fit_presliding(
 ) -> Presliding:
     """Fit the curve of bristles to a ramp that begins at `start` (s), up to a share of breakaway.
 
-    time (s), gyro rate (rad/s) and drive torque (N m) have shape (n,), are evenly sampled, and go
-    to the positive side; breakaway in N m. One interface is assumed, unless two explain the rate
-    clearly better (Bayesian information criterion). Intervals are Student's t in the logarithm,
-    with residuals that may be autocorrelated. Raises ValueError when too few samples lie in the
-    window or the torque is no ramp.
+    time (s), gyro rate (rad/s) and drive torque (N m) have shape (n,), are evenly sampled, and
+    positive; breakaway in N m. The fit has one interface, unless two are clearly better (Bayesian
+    information criterion). Intervals are Student's t in the logarithm, with autocorrelated
+    residuals. Raises ValueError for too few samples in the window or a torque that is no ramp.
     """
     ramp = ramp_of(time, rate, torque, start, max(share, *WINDOWS) * breakaway)
     whole = ramp.until(share * breakaway)
@@ -140,7 +138,7 @@ def fit_presliding(
 
 
 def _believed(two: BristleFit, one: BristleFit) -> bool:
-    """Whether two interfaces explain the rate clearly better, and not by a curve cut in two."""
+    """Whether two interfaces fit clearly better and are not two parts of one curve."""
     strong, weak = two.interfaces
     apart = strong.torque / strong.stiffness > APART * weak.torque / weak.stiffness
     return apart and two.criterion < one.criterion - CLEARLY
@@ -169,20 +167,20 @@ def _row_of_sum(fit: BristleFit) -> Array:
 def _of_logarithm(fit: BristleFit, name: str, value: float, row: Array) -> Estimate:
     error = float(np.sqrt(row @ fit.errors.covariance @ row))
     inner = with_error(name, float(np.log(value)), "", error, fit.errors.freedom, METHOD)
-    found = exponential(inner, "N m/rad")
+    estimate = exponential(inner, "N m/rad")
     if fit.errors.misfit <= MISFIT:
-        return admitted(found)
-    return replace(found, low=None, high=None, level=None, reason=OFF_THE_CURVE())
+        return admitted(estimate)
+    return replace(estimate, low=None, high=None, level=None, reason=OFF_THE_CURVE())
 
 
 def _by_window(
     ramp: Ramp, smallest: float, breakaway: float, best: BristleFit, share: float
 ) -> dict[float, BristleFit]:
-    """The fits to windows that end elsewhere, with as many interfaces as were found.
+    """Fits to the other windows, with the same number of interfaces, by share.
 
-    A window that ends before the strongest interface bends says nothing of it.
+    A window that ends before the strongest interface bends does not determine it.
     """
-    found = {}
+    fits = {}
     strongest, *weaker = best.interfaces
     least = sum(each.torque for each in weaker) + BENT * strongest.torque
     for other in WINDOWS:
@@ -191,37 +189,37 @@ def _by_window(
             continue
         fit = fit_bristles(part, smallest, best.again(part, breakaway, smallest))
         if fit is not None and other != share:
-            found[other] = fit
-    return found
+            fits[other] = fit
+    return fits
 
 
 def _window_shift(share: float, by_window: Mapping[float, Estimate]) -> float:
-    """By how much the logarithm depends on where the window ends, beyond what scatter explains.
+    """Largest significant change of the logarithm between window ends.
 
-    The windows lie in each other: the variance of a difference is that of the variances (Hausman,
-    Econometrica 46, 1978).
+    The windows are nested: the variance of a difference is the difference of the variances
+    (Hausman, Econometrica 46, 1978).
     """
     own, shifts = by_window[share], [0.0]
-    for other, found in by_window.items():
-        if abs(other - share) > NEAR or not (own.has_interval and found.has_interval):
+    for other, there in by_window.items():
+        if abs(other - share) > NEAR or not (own.has_interval and there.has_interval):
             continue
-        change = abs(float(np.log(found.value / own.value)))
-        errors = [(each.standard_error or 0.0) / each.value for each in (own, found)]
+        change = abs(float(np.log(there.value / own.value)))
+        errors = [(each.standard_error or 0.0) / each.value for each in (own, there)]
         scatter = float(np.sqrt(abs(errors[0] ** 2 - errors[1] ** 2)))
-        if change > student(min(own.freedom or np.inf, found.freedom or np.inf)) * scatter:
+        if change > student(min(own.freedom or np.inf, there.freedom or np.inf)) * scatter:
             shifts.append(change)
     return max(shifts)
 
 
 def _damping_shift(fit: BristleFit) -> tuple[float, float]:
-    """See `Presliding`: one linear step of the fit to a curve whose bristles are damped."""
+    """`Presliding.damping_shift`: one linear step of the fit to a curve with damped bristles."""
     change = fit.change_by_damping()
     step = np.linalg.lstsq(fit.jacobian, change, rcond=None)[0]
     return float(step[fit.of_stiffness[0]]), float(_row_of_sum(fit) @ step)
 
 
 def _split_shift(fit: BristleFit) -> float:
-    """What the logarithm of the stiffness at rest lacks if the weaker interface is really two."""
+    """Error of the logarithm of the stiffness at rest if the weaker interface is in truth two."""
     if len(fit.interfaces) < 2:
         return 0.0
     strong, weak = fit.interfaces
@@ -236,7 +234,7 @@ def _split_shift(fit: BristleFit) -> float:
 
 
 def _beside(estimate: Estimate, hidden: float, kind: Kind) -> Estimate:
-    """With the share by which a hidden interface may shift it; a bound where that is too much."""
+    """Add the relative shift by a hidden interface; a bound where that shift is too large."""
     if not hidden:
         return estimate
     shifted = _shifted(estimate, HIDDEN, hidden)
@@ -263,7 +261,7 @@ def _chord(ramp: Ramp, bias: float, smallest: float) -> float:
 
 
 def _shifted(estimate: Estimate, source: str, relative: float) -> Estimate:
-    """With a part that is evenly likely up to a share of the value either way (GUM 4.3.7)."""
+    """Add a rectangular part with a relative half-width (GUM 4.3.7)."""
     return shifted_by(estimate, source, abs(relative) * estimate.value / math.sqrt(3.0))
 
 

@@ -1,9 +1,9 @@
 """Position-dependent ripple of friction: fitted to long runs, removed from short windows.
 
 T = dry(v) (1 + Re(z exp(i N q))) + sigma2 v, with N periods per revolution of the angle q. A window
-that is short against a period sees one place of it, whatever its length in time, and no repetition
-at the same place shows that; runs over many periods tell N and z. The ripple that drives the load
-is F = T - J dω/dt: below the loop's bandwidth both T and ω follow it.
+that is short against a period contains one place of the ripple, also if it is long in time;
+repetitions at that place do not show it. Runs over many periods determine N and z. The ripple that
+drives the load is F = T - J dω/dt: below the loop's bandwidth both T and ω follow it.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from campaign.estimation.intervals import BATCHES, of_series
 from campaign.estimation.least_squares import straight_line
 
 LEAST_PERIODS = 0.8
-"""that a window must span for its own cosine and sine to be told apart from its mean."""
+"""Fewest periods in a window that separate its cosine and sine from its mean."""
 SEARCHED_PERIODS = 2.5
-"""that a run must span for N to be sought in it."""
+"""Fewest periods in a run for the search of N."""
 FASTEST = 1.5
-"""Hz; ripple that passes faster is not asked: the loop no longer follows it."""
+"""Highest frequency of the ripple (Hz) in the search: above it the loop does not follow."""
 BINS = 512
-"""over angle into which a run is put before N is sought."""
+"""Number of bins over a run for the search of N."""
 STANDS_OUT = 5.0
-"""by which the largest harmonic exceeds the median one, to be called a ripple."""
+"""Least ratio of the largest harmonic to the median one for a ripple."""
 AGREEING = 3
-"""runs that have to show the same N, where nobody told it."""
+"""Fewest runs with the same N, where N is not given."""
 CERTAIN = 3.0
-"""standard errors that the pooled amplitude has to exceed."""
+"""Least pooled amplitude, in standard errors."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,12 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Ripple:
-    """The ripple of a map, relative to dry friction: Re(amplitude exp(i periods q)).
+    """Ripple of a map, relative to dry friction: Re(amplitude exp(i periods q)).
 
     Attributes:
         periods: N, per revolution.
         error: standard error of the amplitude's real and imaginary part.
-        runs: from how many runs it was told.
+        runs: number of runs that it is estimated from.
     """
 
     periods: float
@@ -77,11 +77,11 @@ class Ripple:
 
 
 def window_noise(error: Array, ripple: Ripple, first: Array, last: Array, dry: Array) -> Array:
-    """Deviations of windows' means without the slope that a ripple gives to a short window.
+    """Standard errors of windows' means without the drift that a ripple causes in a short window.
 
-    A window that spans most of a period has been freed of it by its own cosine and sine; in a
-    shorter one the ripple is a drift that batches take for noise, and a slow point would count for
-    too little. At least a tenth of the deviation is left.
+    A window over most of a period has its own fit of cosine and sine. In a shorter one the ripple
+    is a drift that batch means count as noise, so that a slow point has too little weight. At
+    least a tenth of the standard error remains.
 
     Args:
         error: standard error from batch means (N m), shape (n,).
@@ -105,7 +105,7 @@ def harmonics_of(angle: Array, periods: float) -> Array:
 def harmonic(angle: Array, rate: Array, torque: Array, inertia: float, periods: float) -> Harmonic:
     """Cosine and sine of F at N `periods` per revolution, in a run at constant speed; arrays (n,).
 
-    Raises ValueError for a run that spans less than `LEAST_PERIODS`.
+    Raises ValueError for a run shorter than `LEAST_PERIODS`.
     """
     steady = straight_line(angle)
     travel = abs(float(steady[-1] - steady[0]))
@@ -116,21 +116,21 @@ def harmonic(angle: Array, rate: Array, torque: Array, inertia: float, periods: 
     columns = np.column_stack(
         [np.ones_like(drift), drift, harmonics_of(steady - centre, periods)],
     )
-    found, _, _, _ = np.linalg.lstsq(columns, np.stack([torque, rate], axis=1), rcond=None)
+    both, _, _, _ = np.linalg.lstsq(columns, np.stack([torque, rate], axis=1), rcond=None)
     speed = float(np.mean(rate))
-    # With q = centre + v t, dω/dt has N v times the sine of ω as its cosine, and minus the cosine
-    # as its sine.
-    cosine = found[2, 0] - inertia * periods * speed * found[3, 1]
-    sine = found[3, 0] + inertia * periods * speed * found[2, 1]
-    noise = of_series("torque", torque - columns @ found[:, 0], "N m").standard_error
+    # With q = centre + v t, the cosine of dω/dt is N v times the sine of ω; its sine is -N v times
+    # the cosine of ω.
+    cosine = both[2, 0] - inertia * periods * speed * both[3, 1]
+    sine = both[3, 0] + inertia * periods * speed * both[2, 1]
+    noise = of_series("torque", torque - columns @ both[:, 0], "N m").standard_error
     error = math.sqrt(2.0) * (noise if noise is not None else float(np.std(torque)))
     return Harmonic(periods, float(cosine), float(sine), error, centre, travel)
 
 
 def dominant_periods(angle: Array, rate: Array, torque: Array, inertia: float) -> float | None:
-    """N of the ripple that stands out in a run at constant speed; None where none does.
+    """N of the dominant ripple in a run at constant speed; None without one.
 
-    Sought from `SEARCHED_PERIODS` in the run's travel to what passes at `FASTEST`. Arrays (n,).
+    Searched from `SEARCHED_PERIODS` in the run's travel to a frequency of `FASTEST`. Arrays (n,).
     """
     count = min(BINS, len(angle) // 2)
     if count < 20:
@@ -150,8 +150,8 @@ def dominant_periods(angle: Array, rate: Array, torque: Array, inertia: float) -
     rest = [(x - straight_line(x)) * taper for x in parts[1:]]
 
     def size(periods: Array, near: Array | float) -> Array:
-        # The acceleration has the frequency of what ripples, also where the wave beside it is
-        # tried: else the rate's own ripple would draw the peak to one side.
+        # The acceleration keeps the frequency of the ripple while other waves are tried:
+        # otherwise the ripple of the rate would shift the peak.
         wave = np.exp(-1j * np.outer(periods, steady))
         of_rate, of_torque = wave @ rest[0], wave @ rest[1]
         return np.asarray(np.abs(of_torque - 1j * inertia * near * speed * of_rate))
@@ -160,31 +160,31 @@ def dominant_periods(angle: Array, rate: Array, torque: Array, inertia: float) -
     grid = np.arange(lowest, highest, step)
     sizes = size(grid, grid)
     best = int(np.argmax(sizes))
-    # At an end of the grid it is a drift, or something that lies beyond.
+    # A peak at an end of the grid is a drift, or lies beyond the grid.
     if best in (0, len(grid) - 1) or sizes[best] < STANDS_OUT * float(np.median(sizes)):
         return None
-    found = float(grid[best])
+    peak = float(grid[best])
     for width in (step, 0.2 * step):
-        fine = np.linspace(found - width, found + width, 41)
-        found = float(fine[int(np.argmax(size(fine, found)))])
-    return found
+        fine = np.linspace(peak - width, peak + width, 41)
+        peak = float(fine[int(np.argmax(size(fine, peak)))])
+    return peak
 
 
 def pooled(harmonics: Sequence[Harmonic], dry: Array) -> Ripple | None:
-    """The ripple that runs in one direction share; None where they share none.
+    """Common ripple of the runs in one direction; None without one.
 
     dry: signed friction torque without its viscous part (N m) of each run, shape (m,).
     """
     if len(harmonics) < 2:
         return None
     travel = np.array([each.travel for each in harmonics])
-    told = np.array([each.periods for each in harmonics])
-    near = np.abs(told - told[:, None]) <= np.pi / np.minimum(travel, travel[:, None])
+    counts = np.array([each.periods for each in harmonics])
+    near = np.abs(counts - counts[:, None]) <= np.pi / np.minimum(travel, travel[:, None])
     chosen = near[int(np.argmax(near.sum(axis=1)))]
-    known = bool(np.ptp(told) == 0.0)
+    known = bool(np.ptp(counts) == 0.0)
     if int(chosen.sum()) < (2 if known else AGREEING):
         return None
-    periods = float(np.average(told[chosen], weights=travel[chosen] ** 2))
+    periods = float(np.average(counts[chosen], weights=travel[chosen] ** 2))
     kept = [(each, d) for each, d, c in zip(harmonics, dry, chosen, strict=True) if c]
     seen = np.array(
         [
@@ -206,15 +206,15 @@ def pooled(harmonics: Sequence[Harmonic], dry: Array) -> Ripple | None:
 def ripple_of_points(
     harmonics: Sequence[Harmonic | None], dry: Array, first: Array, last: Array
 ) -> tuple[Array, Array, Ripple | None]:
-    """What of each torque of one direction is ripple (N m), its standard error, and that ripple.
+    """Ripple part of each torque of one direction (N m), its standard error, and the ripple.
 
-    It is what runs share that are long enough to show one; a short window has that of the place
-    where it lies. All zero, and None, where runs share none.
+    The ripple is common to the runs that are long enough to show it; each window has its mean
+    between two angles. Zeros and None without a common ripple.
 
     Args:
-        harmonics: of each run; None where it is too short or shows none.
+        harmonics: of each run; None where it is too short or shows no ripple.
         dry: signed friction torque without its viscous part (N m), shape (n,).
-        first, last: angles between which each window lies (rad), shape (n,).
+        first, last: angles at the ends of each window (rad), shape (n,).
     """
     runs = [i for i, each in enumerate(harmonics) if each is not None]
     ripple = pooled([each for each in harmonics if each is not None], dry[runs])

@@ -1,10 +1,10 @@
 """Rise time of one noisy step, with its interval.
 
-Around each level the response is a parabola, fitted to its neighbours. Wherever that is as close to
-the level as its standard error allows, the level may be crossed; the ends of those times are the
-interval's (test inversion, so that a flat approach gives a lopsided interval, as it should), and
-both together are Newcombe's square-and-add. Over 200 seeds each of loops of first and second order,
-with white noise of 0.3 to 5 % of the step, 95 % intervals hold in 94 to 99 %.
+A parabola is fitted to the response around each time near a level. The interval of a crossing
+contains the times at which the parabola differs from the level by no more than chance (test
+inversion: a flat approach results in an asymmetric interval). Newcombe's square-and-add combines
+both crossings. Coverage of 95 % intervals: 94 to 99 % (200 seeds each, loops of first and second
+order, white noise of 0.3 to 5 % of the step).
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from campaign.reason import Cause
 
 METHOD = "parabolas around 10 and 90 %, and where they may cross these for the recording's noise"
 QUIET = 1e-4
-"""of the step: a noise below it is none, and tells nothing of how steps differ."""
+"""Noise over step height below which the recording counts as noise-free."""
 FEWEST = 30
-"""samples of a standstill by which noise, and how long it lasts, are told."""
+"""Fewest samples of a standstill for an estimate of the noise and its correlation."""
 DEGREE = 2
-"""of the polynomials of the local fit."""
+"""Degree of the polynomials of the local fit."""
 WIDTH = 0.25
-"""Half-width of a parabola over the rise time, at most ..."""
+"""Largest half-width of a parabola over the rise time."""
 NOISY = 0.01
-"""... with this noise, as a share of the step; with less it is narrower, for then it is how a
-response bends that makes a parabola wrong."""
+"""Noise over step height from which on parabolas have the full width. With less noise they are
+narrower: then the curvature of the response dominates their error."""
 BENDS = "bends of the response"
-"""The systematic part of what parabolas of half the width change: friction bends a response."""
+"""Source of the systematic part: the change by parabolas of half the width (friction)."""
 FINE = 100
-"""places in a rise time at which a parabola is looked at."""
+"""Number of parabolas in a rise time."""
 SHORT_STANDSTILL = Cause(
     "standstill too short",
     "the standstill before it has fewer than {samples} samples to estimate its noise",
@@ -49,7 +49,7 @@ HIDDEN_LEVEL = Cause(
 
 @dataclass(frozen=True)
 class _Crossing:
-    """When a level is crossed (s), and how far before and after that it may be."""
+    """Time of a crossing (s), and the distances (s) to the ends of its interval."""
 
     at: float
     before: float
@@ -59,14 +59,14 @@ class _Crossing:
 def rise_interval(
     time: Array, response: Array, start: float, step: float, found: StepCharacteristics
 ) -> tuple[Estimate, float] | None:
-    """Rise time (s) from 10 to 90 % of a step, and when it begins (s); None without any noise.
+    """Rise time (s) from 10 to 90 % of a step, and the start of the rise (s); None without noise.
 
-    Not determined, with the reason, where noise hides when a level is crossed; without an interval
-    where little noise has no standstill to be told by.
+    Not determined, with the reason, where noise hides the crossing of a level. Without an interval
+    where the standstill is too short to estimate small noise.
 
     Args:
         time, response: shape (n,), starting before the step at `start` (s); `step` is its height.
-        found: what was found of it, with a rise time.
+        found: characteristics of this step, with a rise time.
     """
     known = np.isfinite(response)
     time, response = time[known], response[known]
@@ -98,14 +98,14 @@ def rise_interval(
     first, last = (crossed(level, about, half) for level, about in places)
     if first is None or last is None:
         hidden = LOW if first is None else HIGH
-        told = HIDDEN_LEVEL(noise_percent=100 * found.noise, level_percent=100 * hidden)
-        return Estimate.without_interval("rise_time", math.nan, "s", told), math.nan
+        reason = HIDDEN_LEVEL(noise_percent=100 * found.noise, level_percent=100 * hidden)
+        return Estimate.without_interval("rise_time", math.nan, "s", reason), math.nan
     rise = _between(first, last)
     early, late = (crossed(level, about, 0.5 * half) for level, about in places)
     if early is not None and late is not None:
         narrower = _between(early, late)
-        # An efficient mean and another one differ by the difference of their variances
-        # (Hausman, Econometrica 46 (1978) 1251).
+        # The variance of the difference between an efficient mean and another one is the
+        # difference of their variances (Hausman, Econometrica 46 (1978) 1251).
         chance = (narrower.half_width**2 - rise.half_width**2) / quantile**2
         square = (narrower.value - rise.value) ** 2 - max(chance, 0.0)
         rise = shifted_by(rise, BENDS, math.sqrt(max(square, 0.0)))
@@ -121,21 +121,21 @@ def _between(first: _Crossing, last: _Crossing) -> Estimate:
 
 
 def _noise(rest: Array) -> tuple[float, float]:
-    """Standard deviation about a line, and by how much more a mean scatters than of white noise."""
+    """Standard deviation about a line, and deviation of a mean over that with white noise."""
     left = rest - straight_line(rest)
     square = float(left @ left)
     if square == 0.0:
         return 0.0, 1.0
     alike = float(left[1:] @ left[:-1]) / square
-    alike += (1.0 + 4.0 * max(alike, 0.0)) / len(rest)  # residuals are less alike than the noise
+    alike += (1.0 + 4.0 * max(alike, 0.0)) / len(rest)  # residuals are less correlated than noise
     alike = min(max(alike, 0.0), 0.95)
     return math.sqrt(square / (len(rest) - 2)), math.sqrt((1.0 + alike) / (1.0 - alike))
 
 
 def _parabolas(time: Array, share: Array, at: Array, half: float) -> tuple[Array, Array]:
-    """Value at each place of the parabola through what is within `half` (s) of it.
+    """Value at each time `at` of the parabola through the samples within `half` (s) of it.
 
-    And its standard error over that of a sample; both (m,), NaN where there is too little.
+    And its standard error over that of a sample; both (m,), NaN for too few samples.
     """
     value, weight = np.full(len(at), np.nan), np.full(len(at), np.nan)
     first = np.searchsorted(time, at - half)
@@ -150,9 +150,9 @@ def _parabolas(time: Array, share: Array, at: Array, half: float) -> tuple[Array
 
 
 def _crossing(at: Array, off: Array, bound: Array, about: float) -> _Crossing | None:
-    """Where `off` rises through zero next to `about`, and as far as it is within `bound` of it.
+    """Rise of `off` through zero nearest to `about`, with the range where it is within `bound`.
 
-    None where it does not, or is within it up to an end.
+    None where it does not rise through zero, or the range extends to the last value.
     """
     rising = np.flatnonzero((off[:-1] < 0) & (off[1:] >= 0))
     if not len(rising):
@@ -164,11 +164,11 @@ def _crossing(at: Array, off: Array, bound: Array, about: float) -> _Crossing | 
     above = np.flatnonzero(high[k + 1 :] >= 0)
     if not len(above):
         return None
-    # Nothing rises before the step does.
+    # The response does not rise before the step.
     begin = _zero(at, low, int(below[-1])) if len(below) else float(at[0])
     return _Crossing(when, when - begin, _zero(at, high, k + int(above[0])) - when)
 
 
 def _zero(at: Array, values: Array, k: int) -> float:
-    """Where a line from value k to the next is zero."""
+    """Zero of the line from value k to the next."""
     return float(at[k] - values[k] * (at[k + 1] - at[k]) / (values[k + 1] - values[k]))

@@ -1,8 +1,8 @@
 """Numbers read from a sampled curve, with the error between samples.
 
-For curves without noise, as a simulation records them. The intervals are brackets: they hold the
-number of this one recording, whatever a curve of the shape that is said does between its samples.
-How a repetition would scatter, only repetitions tell (`together`).
+For noise-free curves of a simulation. The intervals are brackets: they include the number of this
+recording for every curve of the stated shape through the samples. They do not include the scatter
+between repetitions (see `together`).
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ from campaign.estimation.intervals import (
 from campaign.reason import Cause
 
 SAMPLES = "time between samples"
-"""Source of the systematic part that is left of brackets once repetitions are averaged."""
+"""Source of the systematic part that remains of brackets in a mean over repetitions."""
 LOST = Cause("samples lost", "samples were lost")
 PEAK_AT_END = Cause("peak at an end", "it is still rising at an end of what was looked at")
 UNRESOLVED_PEAK = Cause("peak not resolved", "the samples are too far apart to resolve it")
 ALIKE = Cause("equal parts", "its parts agree to {digits} digits: a simulation without noise")
-_ROUNDING = 1e-12  # share of a number below which a difference is none
+_ROUNDING = 1e-12  # share of a number below which a difference counts as zero
 
 
 def bracketed(
     name: str, value: float, unit: str, ends: tuple[float, float], method: str, **more: Any
 ) -> Estimate:
-    """A number that certainly lies between `ends`, in whatever order they are given."""
+    """Number that certainly lies between `ends`, which may be in any order."""
     low, high = float(min(*ends, value)), float(max(*ends, value))
     return Estimate(name, float(value), unit, low, high, LEVEL, method, **more)
 
 
 def peak(name: str, samples: Array, unit: str) -> Estimate:
-    """The largest value of a curve, from its samples of shape (n,), evenly spaced.
+    """Largest value of a curve, from its samples of shape (n,), evenly spaced.
 
-    The curve is concave over the five samples around its peak, or there is no interval: then it
-    lies above its chords and below their continuations, and so does the peak. Where samples were
-    lost (NaN) it is not determined: it may have been among them.
+    The interval needs a curve that is concave over the five samples around its peak: then the peak
+    lies above the chords and below their extensions. Where samples are missing (NaN) the peak is
+    not determined, because it may be one of them.
     """
     if not np.all(np.isfinite(samples)):
         return Estimate.without_interval(name, math.nan, unit, LOST())
@@ -63,7 +63,7 @@ def peak(name: str, samples: Array, unit: str) -> Estimate:
 
 
 def _most_between(samples: Array) -> float:
-    """The most that a concave curve can be between the second and the third of four samples."""
+    """Upper bound of a concave curve between the second and the third of four samples."""
     rise, fall = float(samples[1] - samples[0]), float(samples[2] - samples[3])
     if rise + fall <= 0:
         return float(samples[2])
@@ -72,7 +72,7 @@ def _most_between(samples: Array) -> float:
 
 
 def upward_crossings(time: Array, samples: Array, level: float) -> tuple[Array, Array]:
-    """Where a curve rises through `level`: interpolated times, and the samples' before; (k,)."""
+    """Times of rises through `level`: interpolated, and of the sample before; shapes (k,)."""
     above = samples > level
     after = 1 + np.flatnonzero(above[1:] & ~above[:-1])
     before = after - 1
@@ -81,9 +81,9 @@ def upward_crossings(time: Array, samples: Array, level: float) -> tuple[Array, 
 
 
 def at_sample(name: str, samples: Array, at: int, unit: str) -> Estimate:
-    """A curve's value at a moment that is known to one sample either way, for a smooth curve.
+    """Value of a smooth curve at a time with an uncertainty of one sample.
 
-    Not determined where one of these samples was lost (NaN).
+    Not determined where one of these samples is missing (NaN).
     """
     near = samples[max(at - 1, 0) : at + 2]
     if not np.all(np.isfinite(near)):
@@ -93,10 +93,10 @@ def at_sample(name: str, samples: Array, at: int, unit: str) -> Estimate:
 
 
 def together(found: Sequence[Estimate], what: str = "repeats") -> Estimate:
-    """One number from repetitions: itself where there is one, else their mean with Student's t.
+    """Mean of repetitions with Student's t; a single one is returned unchanged.
 
-    What each is uncertain by between its samples stays, as a rectangular distribution (GUM 4.3.7).
-    Where one was not determined (NaN) the mean is not either, for the same reason.
+    The widest bracket remains as a systematic part, as a rectangular distribution (GUM 4.3.7).
+    If one value is not determined (NaN), the mean is not determined, for the same reason.
     """
     first = next((each for each in found if math.isnan(each.value)), found[0])
     if len(found) == 1 or math.isnan(first.value):
@@ -111,10 +111,10 @@ def together(found: Sequence[Estimate], what: str = "repeats") -> Estimate:
 
 
 def drop_interval_if_deterministic(estimate: Estimate, scale: float, digits: int = 9) -> Estimate:
-    """The estimate, without its interval where that is below `digits` digits of `scale` (its unit).
+    """Remove an interval that is below `digits` digits of `scale` (in the unit of the estimate).
 
-    A simulation without noise repeats itself to the last digits: that says nothing of how far its
-    numbers can be trusted, and an interval of it would claim a lot.
+    Repetitions of a noise-free simulation are equal to the last digits. An interval from their
+    scatter would suggest an accuracy that the numbers do not have.
     """
     half = estimate.half_width
     if not half <= 10.0**-digits * scale:
@@ -124,11 +124,10 @@ def drop_interval_if_deterministic(estimate: Estimate, scale: float, digits: int
 
 
 def largest(name: str, found: Sequence[Estimate], unit: str) -> Estimate:
-    """The largest of several numbers, with an interval that holds it whichever of them it is.
+    """Largest of several numbers, with an interval that is valid for each of them as the largest.
 
-    The intervals are made wide enough to hold all numbers at once (Bonferroni), by Student's t
-    where they have a standard error; the largest then lies between the largest of the lower and
-    the largest of the upper ends.
+    Simultaneous intervals of all numbers (Bonferroni, Student's t): the largest number lies between
+    the largest of the lower and the largest of the upper ends. No interval without standard errors.
     """
     top = max(each.value for each in found)
     without = next((each for each in found if each.standard_error is None), None)
@@ -147,11 +146,11 @@ def largest(name: str, found: Sequence[Estimate], unit: str) -> Estimate:
 
 
 def shifted(name: str, estimate: Estimate, by: float) -> Estimate:
-    """The estimate plus a number that is known exactly, by another name."""
+    """Estimate plus an exact number, under another name."""
     low, high = (None if end is None else end + by for end in (estimate.low, estimate.high))
     return replace(estimate, name=name, value=estimate.value + by, low=low, high=high)
 
 
 def named(estimate: Estimate, name: str) -> Estimate:
-    """The same number by another name."""
+    """The same estimate under another name."""
     return replace(estimate, name=name)

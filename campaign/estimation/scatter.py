@@ -1,8 +1,7 @@
 """Scatter of numbers with chi-square intervals, also of few readings of a quantized sensor.
 
-Rounding to a count adds the variance count^2/12 where readings scatter over several counts, and
-anything from nothing to a quarter of a count squared where they do not (Sheppard's corrections and
-their limit).
+Rounding to a count adds the variance count^2/12 where readings scatter over several counts, and 0
+to count^2/4 where they do not (Sheppard's corrections and their limit).
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from campaign.estimation.intervals import LEVEL, SINGLE_VALUE, of_repeats, shift
 from campaign.reason import Cause
 
 DITHERED = 0.5
-"""Deviation over count from which rounding errors of readings are independent of each other."""
+"""Deviation over count above which rounding errors of readings are independent."""
 RESOLUTION = "sensor resolution"
 SINGLE_READING = Cause("single reading", "a single reading has no deviation")
 WITHIN_A_COUNT = Cause(
@@ -29,7 +28,7 @@ ZERO_MEAN = Cause("mean of zero", "its mean is zero")
 
 
 def deviation_limits(deviation: float, freedom: float) -> tuple[float, float]:
-    """Ends of the 95 % interval of a standard deviation that was estimated with `freedom`."""
+    """Ends of the 95 % interval of a standard deviation with degrees of freedom `freedom`."""
     from scipy.special import chdtri
 
     # chdtri takes the upper tail.
@@ -39,16 +38,16 @@ def deviation_limits(deviation: float, freedom: float) -> tuple[float, float]:
 
 
 def relative_scatter(name: str, values: Array) -> Estimate:
-    """Standard deviation of all values over their mean, with n, of repeated sets of a few numbers.
+    """Standard deviation (divisor n) of all values over their mean, for repeated sets of numbers.
 
-    What is repeated are the rows; the columns (both directions of a map, say) are always the same
-    ones, and a row's entries share what makes it differ from the next. So the square is one part
-    that rows scatter by, with a chi-square interval of m - 1, and one by which columns differ,
-    with Student's t; their intervals are put together by squares of distances (Zou and Donner,
-    "Construction of confidence limits about effect measures", Stat. Med. 27 (2008)).
+    The rows are repeats; the columns (such as both directions of a map) are fixed, and the entries
+    of a row are correlated. So the square has two parts: the scatter of rows, with a chi-square
+    interval of m - 1, and the difference of columns, with Student's t. Squares of distances combine
+    their intervals (Zou and Donner, "Construction of confidence limits about effect measures",
+    Stat. Med. 27 (2008)).
 
-    values: shape (m, k). The interval is of the deviation that many rows would have. A mean of zero
-    (a friction that no row shows) has no share: not determined.
+    values: shape (m, k). The interval is for the deviation of many rows. With a mean of zero (no
+    friction in any row) the result is not determined.
     """
     sets, columns = values.shape
     mean = float(np.mean(values))
@@ -81,46 +80,45 @@ def mean_of_readings(
 ) -> Estimate:
     """Mean of readings with Student's t; one count of the sensor (0: none) in the same unit.
 
-    Readings that scatter by less than half a count are all rounded by nearly the same: that is a
-    systematic part, evenly likely within half a count either way.
+    Readings with a scatter below half a count have almost the same rounding error: a systematic
+    part, rectangular with a half-width of half a count.
     """
-    found = of_repeats(name, readings, unit, "readings")
+    mean = of_repeats(name, readings, unit, "readings")
     alike = len(readings) < 2 or _scatter(readings, count) < DITHERED * count
-    return shifted_by(found, RESOLUTION, count / math.sqrt(12.0) if alike else 0.0)
+    return shifted_by(mean, RESOLUTION, count / math.sqrt(12.0) if alike else 0.0)
 
 
 def deviation_of_readings(
     name: str, readings: Sequence[float], unit: str, count: float = 0.0
 ) -> Estimate:
-    """Standard deviation of these very readings (divided by their number), and the interval of what
-    they are draws of.
+    """Standard deviation of readings (divisor n), with the interval of that of their population.
 
-    The interval is by chi-square. Below one count of the sensor (0: none) rounding alone could make
-    the deviation, and it is a bound: from zero to the largest that such readings leave possible.
+    The interval is by chi-square. Below one count of the sensor (0: none) rounding alone may cause
+    the deviation: then the interval is from zero to the largest deviation that is possible.
     """
-    found = np.asarray(readings, dtype=float)
-    value = float(np.std(found - found[0]))  # equal readings have none, not a rounding error
-    freedom = len(found) - 1
+    values = np.asarray(readings, dtype=float)
+    value = float(np.std(values - values[0]))  # exactly 0 for equal readings
+    freedom = len(values) - 1
     if freedom < 1:
         return Estimate.without_interval(name, value, unit, SINGLE_READING())
-    # With n - 1 in place of n, as the limits take it.
-    low, high = deviation_limits(value * math.sqrt(len(found) / freedom), freedom)
-    method = f"chi-square of {len(found)} readings"
+    # The limits need the divisor n - 1.
+    low, high = deviation_limits(value * math.sqrt(len(values) / freedom), freedom)
+    method = f"chi-square of {len(values)} readings"
     estimate = Estimate(name, value, unit, None, high, LEVEL, method, freedom=freedom)
     if value < count:
-        high = max(high, _largest_unseen(len(found), count))
+        high = max(high, _largest_unseen(len(values), count))
         return replace(estimate, low=0.0, high=high, reason=WITHIN_A_COUNT())
     return replace(estimate, low=math.sqrt(max(0.0, low**2 - count**2 / 12.0)))
 
 
 def _scatter(readings: Sequence[float], count: float) -> float:
-    """Deviation of what was rounded, as far as it can be told (Sheppard)."""
+    """Estimated deviation before rounding (Sheppard)."""
     variance = float(np.var(np.asarray(readings) - readings[0], ddof=1))
     return math.sqrt(max(0.0, variance - count**2 / 12.0))
 
 
 def _largest_unseen(readings: int, count: float) -> float:
-    """Deviation that leaves so many readings on one count in 5 % of all cases, at best."""
+    """Largest deviation with which all `readings` have the same count in 5 % of cases."""
     from scipy.special import ndtri
 
     within = (1.0 - LEVEL) ** (1.0 / readings)

@@ -1,7 +1,7 @@
 """Bandwidth and stability margins from the response of a closed servo loop.
 
-Each is an estimate. Its interval holds the noise of the points; the part of interpolation between
-them is the same in every repetition of the sweep and stands beside it, as a systematic part.
+Each is an estimate. Its interval includes the noise of the points. The error of interpolation is
+the same in every repetition of the sweep; the estimate states it as a systematic part.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from campaign.reason import Cause, Reason
 MINUS_3_DB = 10.0 ** (-3.0 / 20.0)
 """Gain at the bandwidth."""
 LARGEST = 600.0
-"""Logarithm that can still be undone; a polynomial far from its points may pass it."""
+"""Largest argument of exp without overflow; a polynomial far from its points may exceed it."""
 ONE_SIDED = 1.645
-"""Normal quantile of a bound that holds in 95 of 100 repetitions."""
+"""Normal quantile of a one-sided 95 % bound."""
 INTERPOLATION = "interpolation between the frequencies"
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """A passing of -3 dB (of T), of 0 dB or of -180 deg (of L).
+    """Crossing of -3 dB (by T), of 0 dB or of -180 deg (by L).
 
     Attributes:
         level: `-3 dB`, `0 dB` or `-180 deg`.
         frequency: (Hz).
-        margin: what it leaves: phase margin (rad) at 0 dB, gain margin (dB) at -180 deg.
-        extrapolated: it was not measured but follows from how the loop goes on.
+        margin: phase margin (rad) at 0 dB, gain margin (dB) at -180 deg.
+        extrapolated: whether it follows from an extrapolation of the loop beyond the sweep.
     """
 
     level: str
@@ -51,17 +51,17 @@ class Crossing:
 
 @dataclass(frozen=True)
 class ServoCharacteristics:
-    """What a closed loop's response says about it.
+    """Bandwidth, stability margins and crossings of a closed loop.
 
     Attributes:
         bandwidth: lowest frequency at which the gain falls below -3 dB of unity (Hz). A rate loop
             with integral action has unit gain at zero frequency.
         gain_margin: (dB) the smallest above the gain crossover; beyond the sweep the hull of
-            parametric orders, or where those say nothing the bound.
+            parametric orders, or the bound where those determine no margin.
         phase_margin: (rad) the smallest of all.
-        gain_margin_bound: where no crossing of -180 deg was measured: -|L| at the highest frequency
-            that tells, less 1.645 standard errors. It assumes a gain that no longer rises.
-        crossings: all that were found, by level and frequency.
+        gain_margin_bound: without a measured crossing of -180 deg: -|L| at the last phase surely
+            above it, less 1.645 standard errors. It assumes a gain that no longer rises.
+        crossings: all crossings, by level and frequency.
     """
 
     bandwidth: Estimate
@@ -71,7 +71,7 @@ class ServoCharacteristics:
     crossings: tuple[Crossing, ...]
 
     def crossing(self, margin: Estimate) -> Crossing | None:
-        """The one that leaves this margin."""
+        """Crossing with this margin."""
         return next((each for each in self.crossings if each.margin == margin), None)
 
 
@@ -113,7 +113,7 @@ def _not_found(name: str, unit: str, reason: Reason) -> Estimate:
     return Estimate.without_interval(name, math.nan, unit, reason)
 
 
-# What is read of log L = z. T = 1 / (1 + exp(-z)).
+# Functions of z = log L, with T = 1 / (1 + exp(-z)).
 
 
 def _fall(z: ComplexArray) -> Array:
@@ -127,14 +127,14 @@ def _log_gain(z: ComplexArray) -> Array:
 
 
 def _minus_3_db(seen: Response, loop: Response) -> list[Crossing]:
-    """Where T passes -3 dB, by frequency; those that fall."""
+    """Falling crossings of -3 dB by T, by frequency."""
     above = np.log(np.abs(seen.values) / MINUS_3_DB)
-    found = []
+    crossings = []
     for passing in passings(above, seen.relative_error):
         reading = _read(seen.frequency, loop, passing, _fall, _fall) if passing.falling else None
         if reading is not None:
-            found.append(Crossing("-3 dB", _frequency("bandwidth", reading)))
-    return found
+            crossings.append(Crossing("-3 dB", _frequency("bandwidth", reading)))
+    return crossings
 
 
 def _bandwidth(seen: Response, widths: list[Crossing]) -> Estimate:
@@ -151,8 +151,8 @@ def _bandwidth(seen: Response, widths: list[Crossing]) -> Estimate:
 
 
 def _gain_crossovers(loop: Response) -> list[Crossing]:
-    """Where |L| passes 1, each with its phase margin, by frequency."""
-    above, turns, found = np.log(np.abs(loop.values)), None, []
+    """Crossings of 0 dB by L, each with its phase margin, by frequency."""
+    above, turns, crossings = np.log(np.abs(loop.values)), None, []
     for passing in passings(above, loop.relative_error):
 
         def phase(z: ComplexArray) -> Array:
@@ -161,22 +161,22 @@ def _gain_crossovers(loop: Response) -> list[Crossing]:
         reading = _read(loop.frequency, loop, passing, _log_gain, phase)
         if reading is None:
             continue
-        if turns is None:  # the first one stands between -270 and 90 deg
+        if turns is None:  # the phase of the first one is between -270 and 90 deg
             turns = 2.0 * math.pi * math.ceil((reading.value - 0.5 * math.pi) / (2.0 * math.pi))
         margin = _value("phase_margin", "rad", reading, math.pi - turns)
-        found.append(Crossing("0 dB", _frequency("gain_crossover", reading), margin))
-    return found
+        crossings.append(Crossing("0 dB", _frequency("gain_crossover", reading), margin))
+    return crossings
 
 
 def _phase_crossovers(
     loop: Response, gain: list[Crossing]
 ) -> tuple[tuple[Crossing, ...], Estimate | None]:
-    """Where L passes -180 deg above the gain crossover, with gain margins, or else a bound."""
+    """Crossings of -180 deg by L above the gain crossover with gain margins, or else a bound."""
     if not gain or gain[0].margin is None:
         return (), None
     first = gain[0].frequency.value
     phase_there = float(np.interp(math.log(first), np.log(loop.frequency), loop.phase))
-    # Whole turns are arbitrary; the margin at the first crossover tells them.
+    # Whole turns are arbitrary; the margin at the first crossover determines them.
     turn = 2.0 * math.pi * round((phase_there + math.pi - gain[0].margin.value) / (2.0 * math.pi))
     half_turn = turn - math.pi
 
@@ -186,27 +186,27 @@ def _phase_crossovers(
     def margin(z: ComplexArray) -> Array:
         return np.asarray(-DECIBEL * z.real)
 
-    found = []
+    crossings = []
     upper = loop.frequency > first
     passed = passings((loop.phase - half_turn)[upper], loop.relative_error[upper])
     for passing in passed:
         reading = _read(loop.frequency[upper], loop, passing, off, margin)
         if reading is not None:
             kept = _value("gain_margin", "dB", reading)
-            found.append(Crossing("-180 deg", _frequency("phase_crossover", reading), kept))
+            crossings.append(Crossing("-180 deg", _frequency("phase_crossover", reading), kept))
     if passed:
-        return tuple(found), None
+        return tuple(crossings), None
     beyond = gain_margin_beyond(loop, first, half_turn)
     if beyond is not None:
-        found.append(Crossing("-180 deg", beyond.crossover, beyond.margin, extrapolated=True))
+        crossings.append(Crossing("-180 deg", beyond.crossover, beyond.margin, extrapolated=True))
     above = sides(loop.phase - half_turn, loop.relative_error) > 0
-    return tuple(found), _gain_bound(loop, above, gain[-1].frequency.value)
+    return tuple(crossings), _gain_bound(loop, above, gain[-1].frequency.value)
 
 
 def _gain_bound(loop: Response, above: Flags, crossover: float) -> Estimate | None:
-    """-|L| where the phase was last surely above -180 deg, less 1.645 standard errors (dB).
+    """-|L| at the last point surely above -180 deg, less 1.645 standard errors (dB).
 
-    None where that is below the gain crossover.
+    None where that point is below the gain crossover or the bound is not positive.
     """
     if not above.any():
         return None
@@ -225,7 +225,7 @@ def _bound(name: str, value: float, unit: str, kind: Any, why: Reason) -> Estima
 def _gain_margin(
     crossings: tuple[Crossing, ...], bound: Estimate | None, phase: list[Crossing]
 ) -> Estimate:
-    """The least of the crossings; one that is hardly determined gives way to a bound."""
+    """Smallest margin of the crossings; the bound replaces one that is not determined."""
     margins = [each.margin for each in crossings if each.margin is not None]
     least = min(margins, key=lambda margin: margin.value, default=None)
     if least is None or (bound is not None and least.origin is Origin.NOT_DETERMINED):
@@ -237,7 +237,7 @@ def _gain_margin(
 def _read(
     frequency: Array, loop: Response, passing: LevelCrossing, zero: Quantity, value: Quantity
 ) -> Reading | None:
-    """The reading at a passing; None where points are too few or the fit does not pass."""
+    """Reading at a crossing; None where points are too few or the fit does not cross."""
     place = math.log(frequency[passing.before]), math.log(frequency[passing.after])
     try:
         return read(loop, place, zero, value)
@@ -250,20 +250,20 @@ METHOD = "Gaussian process through log L over log frequency"
 
 def _frequency(name: str, reading: Reading) -> Estimate:
     value = math.exp(reading.log_frequency)
-    found = with_error(name, value, "Hz", value * reading.frequency_error, math.inf, METHOD)
-    return admitted(shifted_by(found, INTERPOLATION, value * reading.frequency_gap))
+    frequency = with_error(name, value, "Hz", value * reading.frequency_error, math.inf, METHOD)
+    return admitted(shifted_by(frequency, INTERPOLATION, value * reading.frequency_gap))
 
 
 def _value(name: str, unit: str, reading: Reading, more: float = 0.0) -> Estimate:
     value = reading.value + more
-    found = with_error(name, value, unit, reading.value_error, math.inf, METHOD)
-    return admitted(shifted_by(found, INTERPOLATION, reading.value_gap))
+    estimate = with_error(name, value, unit, reading.value_error, math.inf, METHOD)
+    return admitted(shifted_by(estimate, INTERPOLATION, reading.value_gap))
 
 
 def change(name: str, bare: Estimate, other: Estimate) -> Estimate | None:
-    """What `other` has more than `bare`; None where one of them is a bound or not determined.
+    """Difference `other` less `bare`; None where one of them is a bound or not determined.
 
-    They are of different trials; what interpolation does to both alike is not taken off.
+    They are from different trials; a common error of interpolation is not subtracted.
     """
     if {bare.kind, other.kind} != {"number"}:
         return None

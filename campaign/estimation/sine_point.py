@@ -12,7 +12,7 @@ from campaign.arrays import Array
 from campaign.estimation.intervals import student
 
 HARMONICS = 9
-"""fitted beside the fundamental, as far as the sampling shows them: friction makes odd ones."""
+"""Highest fitted harmonic, as far as the sampling resolves it: friction causes odd ones."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ def sine_point(time: Array, input_: Array, output: Array, frequency: float) -> S
 def mean_point(points: Sequence[SinePoint]) -> SinePoint:
     """Mean of repetitions at one frequency.
 
-    From three on their scatter is its error, unless each one's own is larger. It is widened as far
-    as Student's t of so few is above the normal quantile, which is what it is used with: three
-    complex numbers tell a deviation with four degrees of freedom, 1.4 times.
+    For three or more, its error is from their scatter, unless their own errors are larger. The
+    scatter is widened by Student's t over the normal quantile, because intervals use the latter:
+    three complex numbers have four degrees of freedom and a factor of 1.4.
     """
     values = np.array([point.response for point in points])
     error = float(np.sqrt(np.sum([point.error**2 for point in points]))) / len(points)

@@ -1,9 +1,9 @@
 """Stabilization error of a recording, and of several trials.
 
-It is the standard deviation s of the pointing error, about the mean of the whole record. Under a
-sinusoidal motion each half cycle has one reversal, and so tells s once. Intervals are taken in
-ln s, because s scatters by a share of itself. One trial's interval is of that trial's value:
-friction that differs from trial to trial shows in several trials only.
+It is the standard deviation s of the pointing error, about the mean of the whole record. In a
+sinusoidal motion each half cycle has one reversal, and gives one value of s. Intervals are
+calculated in ln s, because the scatter of s is proportional to s. The interval of one trial
+applies to that trial: only several trials show how friction differs between trials.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from campaign.reason import Cause, Reason
 
 NAME, UNIT = "stabilization_error", "rad"
 ALIKE = 1e-5
-"""Relative standard error below which nothing scatters: a simulation without noise, whose own error
-is of that size."""
+"""Relative standard error below which there is no scatter: the size of the numerical error of a
+simulation without noise."""
 HARDLY = 10 * ALIKE
-"""Relative standard error up to which a number beside one that does not scatter hardly does."""
+"""Relative standard error up to which the scatter of one side of a quotient is negligible."""
 IDENTICAL = 1e-12
-"""The same for two values, which may be alike by chance, and for trials of one seed."""
+"""As `ALIKE`, for two values, which may agree by chance, and for trials of one seed."""
 NO_SCATTER = Cause("not scattering", "repeats agree to the fifth digit: the bench has no scatter")
 SHORT = Cause("record too short", "less than one cycle was recorded")
 TOO_FEW_FOR_BLOCKS = Cause("too few samples for blocks", "too few samples for {blocks} blocks")
@@ -42,9 +42,9 @@ SHORT_BLOCK = Cause(
     "a block is only {times:.2g} times as long as what the error remembers",
 )
 SHORTFALL = 1.5 + 1e-3
-"""Samples that a window of whole cycles may lack, and what the rounding of its times adds."""
+"""Samples that a window of whole cycles may lack, including the rounding of its times."""
 BLOCKS = 6
-"""of an irregular record; with ten, 37 periods of narrow-band noise are covered in 90 % only."""
+"""Blocks of an irregular record; with ten, coverage is 90 % for 37 periods of narrow-band noise."""
 MEMORY = 4.0
 """Least length of a block, in correlation times of the squared deviation."""
 
@@ -53,13 +53,13 @@ def over_cycles(samples: Array, per_cycle: float) -> Estimate:
     """Standard deviation over whole cycles; t over half cycles, in the logarithm.
 
     With the mean squares m of n half cycles about the common mean, ln s has the standard error
-    sd(m) / (2 mean(m) sqrt(n)) and n - 1 degrees of freedom. Holds where noise remembers little
-    of a half cycle: with a fifth of it 94 % are covered. Whole cycles in place of halves cover
-    fewer, 80 to 86 %.
+    sd(m) / (2 mean(m) sqrt(n)) and n - 1 degrees of freedom. Valid for a correlation time of the
+    noise that is short against a half cycle: at a fifth of it, coverage is 94 %. Whole cycles in
+    place of half cycles have a coverage of 80 to 86 %.
 
     Args:
-        samples: shape (k,), the pointing error; what is beyond the last whole cycle does not count.
-        per_cycle: samples in one cycle of the motion; need not be whole.
+        samples: pointing error, shape (k,); samples after the last whole cycle are not used.
+        per_cycle: samples in one cycle of the motion; need not be an integer.
     """
     whole = whole_cycles(len(samples), per_cycle)
     used = samples[: round(whole * per_cycle)] if whole else samples
@@ -70,9 +70,9 @@ def over_cycles(samples: Array, per_cycle: float) -> Estimate:
 
 
 def whole_cycles(samples: int, per_cycle: float) -> int:
-    """Cycles in so many samples, up to one and a half samples short of a whole one.
+    """Number of whole cycles in `samples`; the last one may lack up to one and a half samples.
 
-    A window of whole cycles seldom is of whole samples: 2 cycles of 0.24 Hz are 8333.3 at 1 kHz. It
+    Whole cycles seldom are whole samples: 2 cycles of 0.24 Hz are 8333.3 samples at 1 kHz. A window
     begins within half a sample, and a recording ends up to one sample early.
     """
     return int((samples + SHORTFALL) / per_cycle)
@@ -81,9 +81,9 @@ def whole_cycles(samples: int, per_cycle: float) -> int:
 def over_blocks(samples: Array, name: str = NAME, unit: str = UNIT) -> Estimate:
     """Standard deviation of an irregular record, shape (k,); t over blocks, in the logarithm.
 
-    Holds for any stretch of a motion like this one; of narrow-band noise with six periods in a
-    block 91 % are covered. No interval where a block is shorter than
-    `MEMORY` correlation times of the squared deviation: then neighbours know of each other.
+    Applies to any segment of a similar motion; coverage is 91 % for narrow-band noise with six
+    periods in a block. No interval where a block is shorter than `MEMORY` correlation times of the
+    squared deviation: then neighboring blocks are correlated.
     """
     if len(samples) < 2 * BLOCKS or not np.all(np.isfinite(samples)):
         return _without(samples, name, unit, TOO_FEW_FOR_BLOCKS(blocks=BLOCKS))
@@ -97,7 +97,7 @@ def over_blocks(samples: Array, name: str = NAME, unit: str = UNIT) -> Estimate:
 
 
 def _of_parts(samples: Array, edges: NDArray[np.int_], name: str, unit: str, what: str) -> Estimate:
-    """The standard deviation of all samples, with the scatter of its parts between `edges`."""
+    """Standard deviation of all samples, with the scatter of the parts between `edges`."""
     if not np.all(np.isfinite(samples)):
         return _without(samples, name, unit, LOST())
     squares = (samples - np.mean(samples)) ** 2
@@ -110,12 +110,12 @@ def _of_parts(samples: Array, edges: NDArray[np.int_], name: str, unit: str, wha
         return Estimate.without_interval(name, math.sqrt(mean), unit, NO_SCATTER())
     method = f"standard deviation, Student's t over {len(means)} {what}, in the logarithm"
     inner = with_error(name, 0.5 * math.log(mean), "", error, len(means) - 1, method)
-    found = exponential(inner, unit)
-    return replace(found, reason=OF_ONE_TRIAL()) if found.has_interval else found
+    deviation = exponential(inner, unit)
+    return replace(deviation, reason=OF_ONE_TRIAL()) if deviation.has_interval else deviation
 
 
 def _without(samples: Array, name: str, unit: str, reason: Reason) -> Estimate:
-    """The standard deviation without an interval; not determined where samples are missing."""
+    """Standard deviation without an interval; NaN where samples are missing."""
     if not len(samples) or not np.all(np.isfinite(samples)):
         why = LOST() if len(samples) else SHORT()
         return Estimate.without_interval(name, math.nan, unit, why)
@@ -125,8 +125,8 @@ def _without(samples: Array, name: str, unit: str, reason: Reason) -> Estimate:
 def correlation_time(samples: Array, longest: int) -> float:
     """Correlation time of a series (k,), in samples: 1 for white noise.
 
-    1 + 2 sum of the autocorrelations up to some lag, the largest such sum with lags up to
-    `longest`: the correlation of an oscillation comes back after it was zero.
+    The largest sum 1 + 2 sum of the autocorrelations up to a lag, over all lags up to `longest`:
+    the autocorrelation of an oscillation rises again after a zero.
     """
     deviation = samples - np.mean(samples)
     size = 1 << (2 * len(deviation) - 1).bit_length()
@@ -139,10 +139,10 @@ def correlation_time(samples: Array, longest: int) -> float:
 
 
 def over_trials(found: Sequence[Estimate]) -> Estimate:
-    """What repetitions of one trial say together: the geometric mean, t in the logarithm.
+    """Geometric mean of repetitions of one trial, t in the logarithm.
 
-    It covers what such trials have in common, unlike the interval of a single one, which comes
-    back as it is. Raises ValueError for none.
+    Its interval applies to the mean of such trials. A single estimate is returned unchanged, with
+    the interval of that trial. Raises ValueError for no estimate.
     """
     if not found:
         raise ValueError("no trial to estimate it from")
@@ -157,27 +157,27 @@ def over_trials(found: Sequence[Estimate]) -> Estimate:
 
 
 def quotient(name: str, one: Estimate, other: Estimate) -> Estimate:
-    """`one` over `other`, by Welch in the logarithm; says so where either is of a single trial.
+    """`one` over `other`, by Welch in the logarithm, with the reason of a single-trial side.
 
-    That nothing scatters is its reason only where that is so of both sides.
+    Its reason is "not scattering" only if neither side has a larger scatter.
     """
-    told = ratio(name, one, other)
+    share = ratio(name, one, other)
     sides = (one, other)
     scatter = [e.reason for e in sides if (e.standard_error or 0.0) > HARDLY * abs(e.value)]
     without = [e.reason for e in sides if e.standard_error is None]
     varying = [reason for reason in without if reason not in NO_SCATTER]
     if len(varying) < len(without) and any(scatter):
         without = varying + scatter
-    said = [*filter(None, without)] or [e.reason for e in sides if e.reason]
-    return replace(told, reason=said[0]) if said else told
+    reasons = [*filter(None, without)] or [e.reason for e in sides if e.reason]
+    return replace(share, reason=reasons[0]) if reasons else share
 
 
 def decrease(name: str, one: Estimate, other: Estimate) -> Estimate:
-    """Share by which `one` lies below `other`: 1 - one / other."""
-    told = quotient(name, one, other)
+    """Relative decrease from `other` to `one`: 1 - one / other."""
+    share = quotient(name, one, other)
     return replace(
-        told,
-        value=1.0 - told.value,
-        low=None if told.high is None else 1.0 - told.high,
-        high=None if told.low is None else 1.0 - told.low,
+        share,
+        value=1.0 - share.value,
+        low=None if share.high is None else 1.0 - share.high,
+        high=None if share.low is None else 1.0 - share.low,
     )

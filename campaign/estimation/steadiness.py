@@ -1,10 +1,10 @@
 """Whether a window of sliding is steady within its sensors' resolution.
 
-The rate decides. Friction bends over the rate, so that its mean over a rate that varies by a share
-s (1 sigma) is off by up to s^2 of Ts - Tc (half of the curve's second derivative, at its largest).
-The rate is smoothed until its sensor tells a twentieth of its mean; what then varies, varies. A
-torque that varies at a constant rate moves no point: batch means have it in the interval. Only its
-trend is reported.
+The criterion is the rate. Friction is a curve over the rate: with a relative variation s (1 sigma)
+of the rate, the error of its mean is at most s^2 of Ts - Tc (half of the curve's largest second
+derivative). The rate is smoothed until its sensor resolves a twentieth of its mean; the remaining
+variation is real. A torque that varies at a constant rate does not shift a point, and the interval
+from batch means includes it. Only its trend is reported.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from campaign.estimation.time_stuck import SIGMAS, count_of
 from campaign.reason import NONE, Cause, Reason
 
 VARIES = 0.1
-"""Share of its mean by which the rate may vary in a window (1 sigma): 1 % of Ts - Tc at most."""
+"""Largest relative variation of the rate in a window (1 sigma): an error of at most 1 % of Ts - Tc.
+"""
 RESOLVED = 0.5 * VARIES
-"""Share of the mean rate that a sensor has to tell, smoothed over a tenth of the window at most."""
+"""Share of the mean rate to be resolved by smoothing over at most a tenth of the window."""
 CHANCE = 4.0
-"""times the variance of its sensor that a smoothed rate may have: chi-square of the ten means of a
-window is below 3.3 times their number in 99.9 % of cases."""
+"""Largest variance of a smoothed rate by its sensor, as a multiple: chi-square of the ten means of
+a window is below 3.3 times their number in 99.9 % of cases."""
 STICKS = 0.25
-"""Share of the mean rate below which the load all but sticks."""
+"""Share of the mean rate below which the load almost sticks."""
 DRIFTS = 0.25
-"""Share of its mean by which a rate may change across a window, be uncertain, or miss its
-command."""
+"""Largest relative change of a rate across a window, uncertainty, or deviation from its command."""
 FEWEST_COUNTS = 10.0
-"""of the sensor that a window spans."""
+"""Fewest counts of the sensor in a window."""
 TORQUE_DRIFT = 0.01
-"""Share of its mean by which the torque may change across a window without a word ..."""
+"""Relative change of the torque across a window above which it is reported, if significant."""
 SURE = 0.99
-"""... and how sure that has to be."""
+"""Confidence of a significant change."""
 
 TOO_FEW_COUNTS = Cause(
     "too few counts", "the window spans {counts:.2g} counts of the sensor, and needs {needs:.2g}"
@@ -64,12 +64,12 @@ def unsteady(
     *,
     own_sensor: bool = True,
 ) -> Reason:
-    """Why a window is no steady sliding, as far as its samples show; `NONE` where they do not.
+    """Why a window is no steady sliding, from its samples; `NONE` if they show no reason.
 
     Args:
-        time, rate: s, rad/s; shape (n,), n at least 3, lost samples left out.
-        angle: by an encoder (rad), shape (n,); None where nobody recorded it.
-        own_sensor: whether the rate has a sensor of its own, and is not made of the angle.
+        time, rate: s, rad/s; shape (n,), n at least 3, without missing samples.
+        angle: by an encoder (rad), shape (n,); None: not recorded.
+        own_sensor: whether the rate has its own sensor and is not derived from the angle.
     """
     mean = abs(float(np.mean(rate)))
     if mean < np.finfo(float).tiny:
@@ -81,11 +81,11 @@ def unsteady(
         return TOO_FEW_COUNTS(counts=counts, needs=FEWEST_COUNTS)
     seen = seen_rate(time, rate, angle, own_sensor=own_sensor)
     values = seen.values
-    there = np.isfinite(values)
-    columns = np.column_stack([np.ones_like(time), time - time.mean()])[there]
-    if there.sum() <= columns.shape[1]:
+    known = np.isfinite(values)
+    columns = np.column_stack([np.ones_like(time), time - time.mean()])[known]
+    if known.sum() <= columns.shape[1]:
         return NONE
-    values = values[there]
+    values = values[known]
     left = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
     square, explained = float(np.mean(left**2)), (seen.finest / SIGMAS) ** 2
     if square <= (VARIES * mean) ** 2 + CHANCE * explained:
@@ -100,12 +100,12 @@ def unsteady(
 def seen_rate(
     time: Array, rate: Array, angle: Array | None, *, own_sensor: bool = True
 ) -> RelativeRate:
-    """The rate, smoothed until its sensor tells a twentieth of its mean; arguments as above.
+    """Rate, smoothed until its sensor resolves a twentieth of its mean; arguments of `unsteady`.
 
-    Its values are at the samples, shape (n,), NaN where smoothing has none.
+    Its values are at the samples, shape (n,), NaN where smoothing has no value.
     """
     step = float(np.median(np.diff(time)))
-    # Evenly, and NaN where samples were lost: smoothing goes by their number.
+    # Evenly spaced, NaN for missing samples: smoothing depends on the number of samples.
     place = np.round((time - time[0]) / step).astype(int)
     seen = resolved_rate(
         _spread_out(rate, place),
@@ -121,10 +121,10 @@ def seen_rate(
 def drifting(
     change: float, half_width: float, mean: float, commanded: float | None = None
 ) -> Reason:
-    """Why a mean rate is none of steady sliding: its change across the window, or its interval.
+    """Why a mean rate is none of steady sliding: its change, its interval, or its command.
 
-    All in one unit; `half_width` is NaN where there is no interval. A load that is stuck creeps at
-    a rate of its own, which is not the `commanded` one, where that is known.
+    All in one unit; `half_width` is NaN without an interval. A stuck load creeps at a rate that
+    differs from the `commanded` one (None: unknown).
     """
     if commanded is not None and abs(mean - commanded) > DRIFTS * abs(commanded):
         return NOT_REACHED(percent=100.0 * mean / commanded if commanded else math.inf)
@@ -136,10 +136,10 @@ def drifting(
 
 
 def torque_drift(torque: Array, modelled: Array | None = None) -> Reason:
-    """Whether a torque, shape (n,), changes across its window by more than it scatters; by batches.
+    """Significant change of a torque, shape (n,), across its window, by batch means; or `NONE`.
 
-    Running-in does that, warming, and a ripple that is longer than the window. `modelled`, shape
-    (n, m), is fitted beside the change: what is known to vary over position.
+    Causes: running-in, warming, a ripple longer than the window. `modelled`: columns of a known
+    variation over position, shape (n, m), fitted together with the change.
     """
     size = len(torque) // BATCHES
     if size == 0:
@@ -150,23 +150,23 @@ def torque_drift(torque: Array, modelled: Array | None = None) -> Reason:
     means, rows = (
         each[: size * BATCHES].reshape(BATCHES, size, -1).mean(axis=1) for each in (torque, columns)
     )
-    found = np.linalg.lstsq(rows, means[:, 0], rcond=None)[0]
-    left, freedom = means[:, 0] - rows @ found, BATCHES - rows.shape[1]
+    fit = np.linalg.lstsq(rows, means[:, 0], rcond=None)[0]
+    left, freedom = means[:, 0] - rows @ fit, BATCHES - rows.shape[1]
     variance = float(left @ left) / freedom * float(np.linalg.pinv(rows.T @ rows)[1, 1])
-    change, mean = float(found[1]), float(np.mean(torque))
+    change, mean = float(fit[1]), float(np.mean(torque))
     if abs(change) <= max(TORQUE_DRIFT * abs(mean), student(freedom, SURE) * math.sqrt(variance)):
         return NONE
     return TORQUE_DRIFTS(percent=100.0 * change / mean if mean else math.inf)
 
 
 def _counts(rate: Array, angle: Array | None, travel: float, step: float) -> float:
-    """Counts within a window: of an encoder, or of a rate as if it were made of counts."""
+    """Number of counts in a window: of an encoder, or of a quantized rate."""
     count = count_of(rate) * step if angle is None else count_of(angle)
     return travel / count if count > 0 else math.inf
 
 
 def _spread_out(values: Array, place: NDArray[np.int64]) -> Array:
     """Each value at its place, NaN elsewhere."""
-    found = np.full(int(place[-1]) + 1, np.nan)
-    found[place] = values
-    return found
+    spread = np.full(int(place[-1]) + 1, np.nan)
+    spread[place] = values
+    return spread

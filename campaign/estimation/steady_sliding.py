@@ -1,8 +1,8 @@
 """Friction torque of steady sliding from one window of a recording.
 
-At constant rate the drive does nothing but overcome friction (Equation 4.1 without acceleration):
-the mean drive torque, less J times the residual acceleration, is one point of a velocity map. Where
-J is not known, what the residual acceleration takes stays in it.
+At constant rate the drive torque is equal to friction (Equation 4.1 without acceleration). The mean
+drive torque, less J times the residual acceleration, is one point of a velocity map. Where J is
+unknown, the point includes the inertial torque.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ WITHOUT_INERTIA = "mean drive torque with what the residual acceleration takes, 
 
 @dataclass(frozen=True)
 class SteadySliding:
-    """What one window says; SI, signed.
+    """Steady sliding in one window; SI, signed.
 
     Attributes:
         rate: mean rate (rad/s).
         torque: friction torque (N m); its standard error is that of the window alone, with the
             drive torque's autocorrelation and the error of the residual acceleration.
         spread: of the drive torque's samples (N m, 1 sigma).
-        acceleration: residual one (rad/s²), the rate's slope over the window.
-        effective: number of independent samples that would give this standard error.
-        first, last: angles at which the window begins and ends (rad); NaN without `angle`.
+        acceleration: residual acceleration (rad/s²), the slope of the rate over the window.
+        effective: effective number of independent samples.
+        first, last: angles at both ends of the window (rad); NaN without `angle`.
         unsteady: why it is no steady sliding.
-        drift: that the torque changes across the window, where it does.
+        drift: significant change of the torque across the window, or `NONE`.
     """
 
     rate: Estimate
@@ -63,18 +63,18 @@ def steady_sliding(
 ) -> SteadySliding:
     """Rate and friction torque of a settled window.
 
-    A ripple over position is taken out before the deviation is told, where the window spans most of
-    a period: it is no noise, and would make fast points, which average it, seem the worst. The load
-    is slow where friction is large, so that the mean over time is too large (by 0.2 to 0.7 % on two
-    rigs whose rate varied by 9 to 35 %); the torque is the mean over the way.
+    The deviation excludes a ripple over position, where the window spans most of a period: it is no
+    noise, and would increase the errors of fast points, which average it. The load is slow where
+    friction is large, so that the mean over time is too large (by 0.2 to 0.7 % on two rigs with
+    rates that varied by 9 to 35 %). Therefore the torque is the mean over the path.
 
     Args:
         time, rate, torque: s, rad/s, N m; shape (n,).
-        angle: where the load is (rad), shape (n,); None where nobody recorded it.
-        inertia: J (kg m²); None where nobody knows it.
-        periods: of the ripple per revolution, where known.
-        own_sensor: whether the rate has a sensor of its own, and is not made of the angle.
-        commanded: rate that was asked for (rad/s); None where nobody knows it.
+        angle: of the load (rad), shape (n,); None: not recorded.
+        inertia: J (kg m²); None: unknown.
+        periods: of the ripple per revolution; None: unknown.
+        own_sensor: whether the rate has its own sensor and is not derived from the angle.
+        commanded: commanded rate (rad/s); None: unknown.
 
     Raises ValueError for fewer than 3 samples.
     """
@@ -98,7 +98,7 @@ def steady_sliding(
         slope * float(np.ptp(time)), of_rate.half_width, float(rate.mean()), commanded
     )
     trouble = unsteady(time, rate, angle, own_sensor=own_sensor) or trouble
-    # Of a window that is shorter than a known ripple, a change is that of the place.
+    # In a window shorter than a known ripple, a change is due to position.
     short = periods is not None and columns is None
     judged = trouble, NONE if short else torque_drift(torque, columns)
     of_torque = of_series("friction_torque", noise, "N m")
@@ -108,19 +108,19 @@ def steady_sliding(
     of_slope = float(np.sqrt(about @ about / max(len(time) - 2, 1) / (clock @ clock)))
     error = of_torque.standard_error
     if error is None:
-        told = Estimate.without_interval("friction_torque", mean, "N m", of_torque.reason)
-        return SteadySliding(of_rate, told, spread, slope, 1.0, first, last, *judged)
+        friction = Estimate.without_interval("friction_torque", mean, "N m", of_torque.reason)
+        return SteadySliding(of_rate, friction, spread, slope, 1.0, first, last, *judged)
     both = math.hypot(error, (inertia or 0.0) * of_slope)
     method = METHOD if inertia is not None else WITHOUT_INERTIA
-    told = with_error("friction_torque", mean, "N m", both, BATCHES - 1, method)
+    friction = with_error("friction_torque", mean, "N m", both, BATCHES - 1, method)
     effective = (float(np.std(noise)) / both) ** 2 if both > 0 else float(len(time))
-    return SteadySliding(of_rate, told, spread, slope, effective, first, last, *judged)
+    return SteadySliding(of_rate, friction, spread, slope, effective, first, last, *judged)
 
 
 def _over_the_way(
     time: Array, rate: Array, torque: Array, angle: Array | None, own_sensor: bool
 ) -> float:
-    """Mean torque by the smoothed rate; over time where the load went nowhere."""
+    """Mean torque weighted by the smoothed rate; the mean over time for a mean rate of zero."""
     if not abs(float(rate.mean())) > np.finfo(float).tiny:
         return float(torque.mean())
     seen = seen_rate(time, rate, angle, own_sensor=own_sensor).values

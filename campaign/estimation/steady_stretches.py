@@ -1,8 +1,8 @@
-"""Stretches of a recording with a steady rate, found in the data.
+"""Segments (stretches) of a recording with a steady rate, detected in the data.
 
-A recording is cut into short blocks. A stretch grows from block to block as long as each new mean
-rate agrees with those it has, within a share of it and what noise explains; it is then cut off at
-both ends by a share of its length, where the axis still settles.
+A recording is divided into short blocks. A stretch grows block by block while each new mean rate
+agrees with its mean, within a share of it and noise. Then a share of its length is cut off at both
+ends, where the axis still settles.
 """
 
 from __future__ import annotations
@@ -15,33 +15,34 @@ import numpy as np
 from campaign.arrays import Array
 
 BLOCK, LONGEST_BLOCK = 0.02, 0.2
-"""s of a block, or one sample where that is longer; noisy rates have longer ones."""
+"""Length of a block (s), at least one sample; noisy rates have longer blocks."""
 QUIET = 0.02
-"""of the largest rate that the noise of a block's mean may be, where blocks can be that long."""
+"""Noise of a block's mean over the largest rate, above which blocks become longer."""
 TELLS = 0.5
-"""of a rate by which noise may move a block's mean: more, and standstill looks like it."""
+"""Largest share of a rate by which noise may change a block's mean: above it, standstill looks
+like motion."""
 AGREEMENT = 0.04
-"""Share of its rate by which a block may be off the stretch it belongs to."""
+"""Largest relative deviation of a block from the rate of its stretch."""
 NOISE = 4.0
-"""Standard deviations of a block's mean by which noise may move it."""
+"""Largest deviation of a block's mean by noise, in standard deviations."""
 TRIM = 0.15
-"""Share of a stretch that is left out at each end ..."""
+"""Share of a stretch that is cut off at its end."""
 SETTLING = (0.15, 0.35, 0.55, 0.7)
-"""... and shares that are left out at its beginning until it has no trend any more."""
+"""Shares that are cut off at its beginning, in this order, until it has no trend."""
 RATE_TREND, TORQUE_TREND = 0.01, 0.1
-"""of its mean by which rate and torque of a stretch may change from one end to the other."""
+"""Largest relative change of rate and torque from one end of a stretch to the other."""
 SHORTEST_TIME = 0.2
-"""s of a stretch before it is cut, if nobody says: less is the turning point of an overshoot."""
+"""Default shortest stretch before the cut (s): less is the turning point of an overshoot."""
 FEWEST = 12
-"""samples of a stretch after trimming, and ..."""
+"""Fewest samples of a stretch after the cut."""
 SHORTEST = 5
-"""... blocks before it."""
+"""Fewest blocks of a stretch before the cut."""
 SLOWEST = 0.03
-"""of the largest rate: what is slower may be standstill, with a sensor's bias or a creep."""
+"""Share of the largest rate below which motion may be standstill with a sensor bias, or creep."""
 SHORT = 0.3
-"""of the longest stretch about as fast, that is ..."""
+"""Least length of a stretch over the longest one of a similar rate; shorter ones are transients."""
 ALIKE = 0.3
-"""... within this share of its rate: what is shorter was on its way there."""
+"""Largest relative difference of similar rates."""
 
 
 @dataclass(frozen=True)
@@ -62,18 +63,18 @@ def steady_stretches(
     driven: bool = True,
     slowest: float | None = None,
 ) -> tuple[SteadyStretch, ...]:
-    """The stretches of steady motion, in order; none of standstill.
+    """Stretches of steady motion, in order, without standstill.
 
     Args:
-        rate: shape (n,), any unit; NaN where a sample was lost, which ends a stretch.
+        rate: shape (n,), any unit; NaN: missing. More than two missing blocks end a stretch.
         sample_rate: Hz.
-        torque: what drives the axis, shape (n,), in the direction of the rate; None where nobody
-            knows: then a creep before breakaway may be taken for sliding.
-        shortest: of a stretch before it is cut (s).
-        driven: whether the torque has to go with the rate, as it does unless something else, such
-            as gravity, moves the axis as well.
-        slowest: rate (in the unit of `rate`) up to which it stands still; None: 3 % of its fastest.
-            What noise may be counts as standstill besides.
+        torque: drive torque, shape (n,), in the direction of the rate; None: unknown, then creep
+            before breakaway may count as sliding.
+        shortest: shortest stretch before the cut (s).
+        driven: whether the torque must have the sign of the rate: true unless another load, such as
+            gravity, also moves the axis.
+        slowest: rate (in the unit of `rate`) up to which the axis is at standstill; None: 3 % of
+            the largest. A rate within noise also counts as standstill.
     """
     size = max(1, round(BLOCK * sample_rate))
     while True:
@@ -81,7 +82,7 @@ def steady_stretches(
         finite = means[np.isfinite(means)]
         if len(means) < SHORTEST or not len(finite):
             return ()
-        # The largest rate but for single wild samples: what counts as standstill hangs on it.
+        # A quantile excludes single outliers: the limit of standstill depends on the largest rate.
         largest, noise = float(np.quantile(np.abs(finite), 0.999)), _noise(means)
         if noise <= QUIET * largest or 2 * size > LONGEST_BLOCK * sample_rate:
             break
@@ -89,16 +90,16 @@ def steady_stretches(
     still = SLOWEST * largest if slowest is None else slowest
     slowest = max(still, NOISE * noise / TELLS)
     fewest = max(SHORTEST, int(np.ceil(shortest * sample_rate / size)))
-    # What is left of a stretch that settles for long is as long as the shortest one after its cut.
+    # A stretch that settles slowly must remain as long as the shortest one after its cut.
     left = max(FEWEST, (fewest - 2 * max(1, round(TRIM * fewest))) * size)
     grown = [(a, b) for a, b in _grown(means, noise, slowest) if b - a >= fewest]
     level = None
     if torque is not None and not driven and grown:
-        # Not of the whole recording: what accelerates an inertia may be many times friction.
+        # Without the rest of the recording: inertial torque may be many times friction.
         sliding = np.concatenate([torque[a * size : b * size] for a, b in grown])
         if np.isfinite(sliding).any():
             level = float(np.nanquantile(np.abs(sliding), 0.9))
-    found = []
+    stretches = []
     for first, stop in _settled(grown, means):
         for share in SETTLING:
             begin = (first + max(1, round(share * (stop - first)))) * size
@@ -109,20 +110,20 @@ def steady_stretches(
             if _is_steady(rate[part], None if torque is None else torque[part], level):
                 mean = float(np.nanmean(rate[part]))
                 if abs(mean) > slowest:
-                    found.append(SteadyStretch(begin, end, mean))
+                    stretches.append(SteadyStretch(begin, end, mean))
                 break
-    return tuple(found)
+    return tuple(stretches)
 
 
 def _means(rate: Array, size: int) -> Array:
-    """Of blocks of so many samples, shape (n // size,); NaN where half of them were lost."""
+    """Means of blocks of `size` samples, shape (n // size,); NaN if half of them are missing."""
     count = len(rate) // size
     blocks = rate[: count * size].reshape(count, size)
-    there = np.isfinite(blocks)
-    known = there.sum(axis=1)
-    total = np.where(there, blocks, 0.0).sum(axis=1)
+    finite = np.isfinite(blocks)
+    known = finite.sum(axis=1)
+    total = np.where(finite, blocks, 0.0).sum(axis=1)
     means: Array = np.where(2 * known > size, total / np.maximum(known, 1), np.nan)
-    # One or two lost samples of a slow recording end no stretch.
+    # One or two missing blocks, as in a slow recording, do not end a stretch.
     lost = np.flatnonzero(~np.isfinite(means))
     for k in lost[(lost > 0) & (lost < count - 2)]:
         after = next((j for j in (k + 1, k + 2) if np.isfinite(means[j])), None)
@@ -132,23 +133,23 @@ def _means(rate: Array, size: int) -> Array:
 
 
 def _is_steady(rate: Array, torque: Array | None, level: float | None) -> bool:
-    """Whether neither goes anywhere, beyond what its noise explains, and friction is overcome."""
-    there = np.isfinite(rate) if torque is None else np.isfinite(rate) & np.isfinite(torque)
-    if there.sum() < FEWEST or not _stays(rate[there], RATE_TREND):
+    """Whether rate and torque have no trend beyond noise, and the torque overcomes friction."""
+    known = np.isfinite(rate) if torque is None else np.isfinite(rate) & np.isfinite(torque)
+    if known.sum() < FEWEST or not _stays(rate[known], RATE_TREND):
         return False
     if torque is None:
         return True
-    if level is None and not float(torque[there].mean()) * float(rate[there].mean()) > 0:
+    if level is None and not float(torque[known].mean()) * float(rate[known].mean()) > 0:
         return False
-    return _stays(torque[there], TORQUE_TREND, level=level)
+    return _stays(torque[known], TORQUE_TREND, level=level)
 
 
 def _stays(values: Array, share: float, *, level: float | None = None) -> bool:
-    """Whether neither a line nor an arc through them goes far: the top of a sine is not steady.
+    """Whether neither a line nor an arc through the values is significant.
 
-    How far noise alone may bend them follows from its second differences, as if it had ten times
-    their correlation: what is left of a fit would count a curve as noise. `level` stands for the
-    mean where that may be zero: a torque that holds against a load may be any.
+    The arc excludes the top of a sine. The noise level is from second differences, with a factor
+    of ten in variance for correlation; residuals of a fit would include a curve. `level` replaces
+    the mean where that may be zero, as of a torque against an external load.
     """
     place = np.linspace(-0.5, 0.5, len(values))
     arc = 4.0 * (place**2 - float(np.mean(place**2)))
@@ -160,13 +161,13 @@ def _stays(values: Array, share: float, *, level: float | None = None) -> bool:
             return False
     if level is not None:
         return True
-    # What no line and no arc shows, such as a reversal in the middle.
+    # Excludes motions without a line or an arc, such as a reversal in the middle.
     return bool(mean > 4.0 * noise / np.sqrt(len(values)))
 
 
 def _grown(means: Array, noise: float, slowest: float) -> list[tuple[int, int]]:
-    """Blocks [first, stop) whose means agree with each other."""
-    found, first = [], 0
+    """Ranges [first, stop) of blocks with means that agree."""
+    ranges, first = [], 0
     while first < len(means):
         stop, total = first, 0.0
         while stop < len(means) and np.isfinite(means[stop]):
@@ -177,15 +178,15 @@ def _grown(means: Array, noise: float, slowest: float) -> list[tuple[int, int]]:
             total += means[stop]
             stop += 1
         if stop - first >= SHORTEST and abs(total / (stop - first)) > slowest:
-            found.append((first, stop))
+            ranges.append((first, stop))
             first = stop
         else:  # it may begin a block later
             first += 1
-    return found
+    return ranges
 
 
 def _settled(grown: Sequence[tuple[int, int]], means: Array) -> list[tuple[int, int]]:
-    """Those that are not much shorter than others about as fast."""
+    """Ranges that are not much shorter than others of a similar rate."""
     rates = [float(means[a:b].mean()) for a, b in grown]
     kept = []
     for (a, b), rate in zip(grown, rates, strict=True):
@@ -200,7 +201,7 @@ def _settled(grown: Sequence[tuple[int, int]], means: Array) -> list[tuple[int, 
 
 
 def _noise(means: Array) -> float:
-    """Standard deviation of each value, from second differences: a slope is no noise."""
+    """Standard deviation of each value, from second differences, which exclude a slope."""
     bends = np.diff(means, 2)
     bends = bends[np.isfinite(bends)]
     return float(1.4826 * np.median(np.abs(bends)) / np.sqrt(6.0)) if len(bends) else 0.0

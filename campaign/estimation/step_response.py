@@ -13,27 +13,26 @@ from campaign.estimation.least_squares import straight_line
 from campaign.reason import Cause, Reason
 
 FINAL_SHARE = 0.2
-"""Last part of the recording over which the steady state is averaged."""
+"""Share of the recording, at its end, over which the steady state is averaged."""
 SIGMAS = 3.0
-"""Standard deviations of noise that the levels of a rise must lie apart from those it leaves."""
+"""Least distance of 10 % of the step from zero, in standard deviations of the noise."""
 CLEAR = 6.0
-"""... that must fit between a settled response and the edge of its band: it is many samples long
-and one outside would count."""
+"""Least distance of a settled response from the edge of its band, in the same unit: of its many
+samples, a single one outside would count."""
 PEAK = 10.0
-"""... that an overshoot must exceed: a largest sample has the noise that adds to it, two or three
-of them."""
+"""Least overshoot, in the same unit: a largest sample includes two or three standard deviations."""
 SMOOTHED = 1.0 / 3.0
-"""of the rise time, at most, that a response is averaged over: this lengthens a rise by 4 %."""
+"""Largest width of an average over the rise time: it increases a rise by 4 %."""
 LOW, HIGH = 0.1, 0.9
-"""Shares of the step between which a rise counts."""
+"""Levels of a rise, as shares of the step."""
 NO_OVERSHOOT = 0.005
-"""of the step, below which noise hides no overshoot worth a word."""
+"""Share of the step below which a hidden overshoot is negligible."""
 NOT_REACHED = Cause("step not reached", "it was not seen to reach 90 % of the step")
 NOT_SETTLED = Cause(
     "not settled", "it was not seen to stay within the band before its recording ended"
 )
 SCATTERS = "the rate scatters by {noise_percent:.2g} % of the step (1 sigma)"
-"""How the text of what noise hides begins."""
+"""Begin of the texts on characteristics that noise hides."""
 HIDDEN_RISE = Cause(
     "rise hidden by noise",
     SCATTERS + ", too much to see 10 % of it within its rise",
@@ -50,16 +49,16 @@ HIDDEN_OVERSHOOT = Cause(
 
 @dataclass(frozen=True)
 class StepCharacteristics:
-    """Of one step; one downwards is described as its mirror image upwards.
+    """Characteristics of one step; a step downwards is mirrored.
 
     Attributes:
         rise_time: from 10 % to 90 % of the commanded step (s).
         settling_time: from the start of the step until the response stays within the band (s).
         overshoot: largest excess over the commanded step, as a share of it; 0 for none.
         steady_state_error: commanded step less the mean of the last part, in the response's unit;
-            positive where the response falls short.
+            positive where the response is too small.
         noise: standard deviation of the response's noise, as a share of the step.
-        rise_from: when the response reached 10 % (s, on the recording's time base).
+        rise_from: time at which the response reaches 10 % (s, on the recording's time base).
         reasons: why a characteristic is NaN, by its name.
     """
 
@@ -75,13 +74,13 @@ class StepCharacteristics:
 def step_characteristics(
     time: Array, response: Array, start: float, step: float, band: float = 0.02
 ) -> StepCharacteristics:
-    """Characteristics of the answer to a step of height `step` that begins at `start` (s).
+    """Characteristics of the response to a step of height `step` that begins at `start` (s).
 
-    time, response: shape (n,), starting before the step. `band` is a share of the step. A rise that
-    was not seen is NaN, and so is a response that did not settle before its last tenth. A noisy
-    response is averaged over as few samples as show its levels, and over no more than a third of
-    its rise; what noise hides even then is NaN. `reasons` says which it is.
-    Raises ValueError when less than ten samples follow the step.
+    time, response: shape (n,), starting before the step. `band` is a share of the step. The rise
+    time is NaN without a rise, the settling time if the response does not settle before its last
+    tenth. A noisy response is averaged over as few samples as resolve its levels, at most a third
+    of its rise; characteristics that noise still hides are NaN. `reasons` states the causes.
+    Raises ValueError for less than ten samples after the step.
     """
     known = np.isfinite(response)
     time, response = time[known], response[known]
@@ -99,9 +98,9 @@ def step_characteristics(
     reasons: dict[str, Reason] = {}
 
     rise = rise_from = math.nan
-    told = [view for view in views if SIGMAS * view.noise <= LOW]
-    sharp = (view for view in told if CLEAR * view.noise <= 0.5 * LOW)
-    legible = next(sharp, told[-1] if told else None)
+    clean = [view for view in views if SIGMAS * view.noise <= LOW]
+    sharp = (view for view in clean if CLEAR * view.noise <= 0.5 * LOW)
+    legible = next(sharp, clean[-1] if clean else None)
     if legible is not None:
         rise, rise_from = legible.rise, legible.rise_from
     if not math.isfinite(rise):
@@ -143,7 +142,7 @@ def step_characteristics(
 
 @dataclass(frozen=True)
 class _View:
-    """A response averaged over some samples, the noise left in it, and its rise."""
+    """A response averaged over some samples, its remaining noise, and its rise."""
 
     share: Array
     noise: float
@@ -152,7 +151,7 @@ class _View:
 
 
 def _views(time: Array, share: Array, after: Flags, final: Flags) -> Iterator[_View]:
-    """The response as it is, then averaged over 3, 5, 9, ... samples, up to a share of its rise."""
+    """Response without an average, then over 3, 5, 9, ... samples, up to a share of its rise."""
     step = float(np.median(np.diff(time)))
     count = 1
     while count <= np.count_nonzero(final):
@@ -160,11 +159,11 @@ def _views(time: Array, share: Array, after: Flags, final: Flags) -> Iterator[_V
         rise_from, rise = _rise(time, smooth, after)
         if count > 1 and not count * step <= SMOOTHED * rise:
             return
-        # Second differences: what swings or creeps slowly is no noise. Standstill shows noise
-        # that is not white, and so does not fall as it is averaged.
+        # Second differences exclude slow oscillation and creep. The standstill also shows noise
+        # that is not white, which an average reduces less.
         rough = np.diff(share[final], 2) / math.sqrt(6.0 * count)
         moving = math.sqrt(float(np.mean(rough**2))) if rough.size else 0.0
-        # Up to where an average would take in samples of the step.
+        # Without averages that include samples of the step.
         resting = smooth[~after][: -(count // 2) or None]
         still = _scatter(resting) if len(resting) >= MOST_LINE else 0.0
         yield _View(smooth, max(moving, still), rise, rise_from)
@@ -172,7 +171,7 @@ def _views(time: Array, share: Array, after: Flags, final: Flags) -> Iterator[_V
 
 
 MOST_LINE = 10
-"""Samples of a standstill, at least, by which its scatter is told."""
+"""Fewest samples of a standstill for an estimate of its scatter."""
 
 
 def _scatter(samples: Array) -> float:
@@ -182,7 +181,7 @@ def _scatter(samples: Array) -> float:
 
 
 def _averaged(samples: Array, count: int) -> Array:
-    """The mean of each sample and its neighbours, `count` (odd) of them; fewer at the ends."""
+    """Moving mean over `count` (odd) samples; over fewer at the ends."""
     if count == 1:
         return samples
     sums = np.concatenate([[0.0], np.cumsum(samples)])
@@ -193,31 +192,31 @@ def _averaged(samples: Array, count: int) -> Array:
 
 
 def _rise(time: Array, share: Array, after: Flags) -> tuple[float, float]:
-    """When the response leaves 10 % for good on its way to half the step, and how long until 90 %.
+    """Time of the last crossing of 10 % before half the step, and duration from it to 90 %.
 
-    Looked for from half the step to both sides: what noise or a disturbance did before the step
-    is no rise. NaN where it was not seen.
+    The search begins at half the step, to exclude noise or disturbances before the step. NaN
+    without a rise.
     """
     half = np.flatnonzero((share >= 0.5) & after)
     if not half.size:
         return math.nan, math.nan
     middle = int(half[0])
     below = np.flatnonzero(share[:middle] < LOW)
-    there = np.flatnonzero(share[middle:] >= HIGH)
-    if not below.size or not there.size:
+    above = np.flatnonzero(share[middle:] >= HIGH)
+    if not below.size or not above.size:
         return math.nan, math.nan
     begin = _crossing(time, share, int(below[-1]) + 1, LOW)
-    return begin, _crossing(time, share, middle + int(there[0]), HIGH) - begin
+    return begin, _crossing(time, share, middle + int(above[0]), HIGH) - begin
 
 
 def _crossing(time: Array, share: Array, k: int, level: float) -> float:
-    """When `share` crosses `level` between samples k - 1 and k, on a straight line."""
+    """Time at which `share` crosses `level` between samples k - 1 and k, on a straight line."""
     part = (level - share[k - 1]) / (share[k] - share[k - 1])
     return float(time[k - 1] + part * (time[k] - time[k - 1]))
 
 
 def _settled(time: Array, share: Array, after: Flags, band: float) -> float:
-    """When the response crosses into the band for good; inf if never."""
+    """Time of the last crossing into the band; inf if the response ends outside."""
     outside = np.flatnonzero((np.abs(share - 1.0) > band) & after)
     if not outside.size:
         return float(time[after][0])

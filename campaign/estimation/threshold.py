@@ -1,8 +1,8 @@
-"""Where a measured curve crosses a threshold: interval, or bound.
+"""Crossing of a threshold by a measured curve: interval, or bound.
 
 An error is measured at some changes of a parameter, each with its own scatter; between them it is a
-straight line. Wherever the line stands beyond the threshold by more than its scatter it surely has
-passed; wherever it stands below by more than that, it surely has not.
+straight line. Where the line exceeds the threshold by more than its scatter, it has surely passed;
+where it is below by more than that, it has surely not.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ HIDDEN_BY_SCATTER = Cause(
 )
 
 FINE = 40
-"""places between two changes where line and scatter are held against the threshold."""
+"""Steps between two changes for the comparison of line and scatter with the threshold."""
 MANY = 1e9
-"""degrees of freedom: as good as infinitely many."""
+"""Degrees of freedom that stand for infinitely many."""
 ONE_SIDED = 2 * LEVEL - 1
-"""Two-sided level with 95 % on one side: what a bound claims."""
+"""Two-sided level of a one-sided 95 % bound."""
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """A fixed threshold, or `ratio` times the error without change (`value` is then that)."""
+    """A fixed threshold, or `ratio` times the error without change (`value` is the product)."""
 
     value: float
     ratio: float | None = None
@@ -47,19 +47,19 @@ class Threshold:
 def crossing(change: Array, error: Array, threshold: float) -> float | None:
     """Smallest size of a change at which `error` passes `threshold`, linearly interpolated.
 
-    Both sides are followed outwards from no change, and the nearer crossing counts. 0 when the
-    error is beyond it unchanged; None when it is passed nowhere. Shapes (n,), changes increasing.
+    The search goes outwards from no change on both sides; the nearer crossing counts. 0 when the
+    error without change is beyond it; None without a crossing. Shapes (n,), changes increasing.
     """
     middle = int(np.argmin(np.abs(change)))
     if error[middle] > threshold:
         return 0.0
     passed = (_first(change, error, threshold, side) for side in _sides(len(change), middle))
-    found = [abs(place) for place in passed if place is not None]
-    return float(min(found)) if found else None
+    sizes = [abs(place) for place in passed if place is not None]
+    return float(min(sizes)) if sizes else None
 
 
 def _sides(count: int, middle: int) -> tuple[list[int], list[int]]:
-    """Indices from the middle outwards, either way, the middle included."""
+    """Indices from the middle outwards on both sides, including the middle."""
     return list(range(middle, count)), list(range(middle, -1, -1))
 
 
@@ -74,10 +74,10 @@ def _first(change: Array, error: Array, threshold: float, side: Sequence[int]) -
 def passing(name: str, change: Array, errors: Sequence[Estimate], threshold: Threshold) -> Estimate:
     """Smallest size of a change at which the error passes the threshold, with its interval.
 
-    The interval ends where the line, scatter of its two neighbours included, may and where it must
-    have passed (Fieller's construction); it is open where it never must. What a straight line
-    between the changes may do is the systematic part: the distance to a monotone cubic. A threshold
-    that is passed nowhere gives `at least`, up to where nothing can have passed, at 95 %.
+    The interval is between the changes at which the line, with the scatter of its two neighbors,
+    may and must have passed (Fieller's construction); it is open without the latter. The error of
+    the straight line is the systematic part: the distance to a monotone cubic. Without a crossing
+    the result is a bound (`at least`), up to which the error surely has not passed, at 95 %.
 
     Args:
         change: shape (n,), increasing, 0 among them.
@@ -109,7 +109,7 @@ def _bound(
     threshold: Threshold,
     without: Reason | None,
 ) -> Estimate:
-    """How far the parameter may change, at least; both sides of it were tried that far."""
+    """Lower bound of the change, within the smaller of the two ranges tried."""
     reach = float(min(-change[0], change[-1]))
     method = "the largest change tried"
     if without is not None:
@@ -132,19 +132,19 @@ def _nearest(
     level: float = LEVEL,
 ) -> float | None:
     """Smallest size of a change at which the upper (sign +1) or lower (-1) end passes."""
-    found = []
+    sizes = []
     for side in _sides(len(change), int(np.argmin(np.abs(change)))):
         place, gap, half = _band(change, errors, threshold, side, level)
         end = gap + sign * half
         passed = np.flatnonzero(end > 0)
         if len(passed):
             first = int(passed[0])
-            found.append(abs(_zero(place, end, first) if first else place[0]))
-    return float(min(found)) if found else None
+            sizes.append(abs(_zero(place, end, first) if first else place[0]))
+    return float(min(sizes)) if sizes else None
 
 
 def _zero(place: Array, end: Array, first: int) -> float:
-    """Where the chord before the first positive end is zero."""
+    """Zero of the chord before the first positive end."""
     before = first - 1
     slope = (end[first] - end[before]) / (place[first] - place[before])
     return float(place[before] - end[before] / slope)
@@ -157,9 +157,9 @@ def _band(
     side: Sequence[int],
     level: float,
 ) -> tuple[Array, Array, Array]:
-    """Places from no change outwards, line minus threshold and half of its interval, each (m,).
+    """Changes outwards from none, line minus threshold, and half-width of its interval, each (m,).
 
-    The line is a sum of independent errors, each by its weight; Welch's degrees of freedom.
+    The line is a weighted sum of independent errors, with Welch's degrees of freedom.
     """
     from scipy.special import stdtrit
 
@@ -185,7 +185,7 @@ def _band(
 def _interpolation(change: Array, error: Array, threshold: float, value: float) -> float:
     """Standard uncertainty of the straight line: its distance from a monotone cubic.
 
-    0 with fewer than three changes, which no curve can be drawn through.
+    0 with fewer than three changes, which determine no curve.
     """
     if len(change) < 3:
         return 0.0

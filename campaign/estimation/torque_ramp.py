@@ -13,7 +13,7 @@ BINS = 250
 LONGEST_BIN = 0.1
 """s; a slow ramp has more bins than BINS."""
 FEWEST_BINS = 20
-"""of a ramp, so that a curve and its errors can be told."""
+"""Fewest bins of a ramp for a curve and its errors."""
 
 
 @dataclass(frozen=True)

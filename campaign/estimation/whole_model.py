@@ -1,7 +1,7 @@
 """Fit of a simulated model to several recordings at once, with intervals.
 
-What simulates is handed in: a friction model along measured motions, a whole bench. The search from
-several starts is that of calibrations (`multi_start`), and so is what counts as being at a bound.
+The caller provides the simulation: a friction model along measured motions, or a whole bench. The
+search from several starts and the rule for bounds are those of calibrations (`multi_start`).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Values = tuple[float, ...]
 Residuals = Callable[[Values], Sequence[Array]]
 METHOD = "least squares through the simulation; deviation with autocorrelation (Newey and West)"
 NULL = 1e-6
-"""Of the largest singular value: directions below it leave their parameters open."""
+"""Share of the largest singular value below which a direction is not determined."""
 WENT_TO_BOUND = Cause("at bound", "it went to its {side} bound")
 NOT_IN_MOTION = Cause("not in the motion", "the motion does not determine it")
 LEFT_OPEN = Cause("left open by the motion", "the motion leaves it open")
@@ -53,11 +53,12 @@ class ModelFit:
     """A fitted model.
 
     Attributes:
-        estimates: of the unknowns, by name; at a bound, or not determined, where they are.
+        found: result of the search.
+        estimates: of the unknowns, by name; their origin states a bound or "not determined".
         values: SI, in the order of the unknowns.
         residuals: of each recording, shape (n,).
-        regression: of the residuals by the free unknowns' shares; None where none is free.
-        free: which unknowns these are.
+        regression: of the residuals on the shares of the free unknowns; None without a free one.
+        free: mask of the free unknowns.
     """
 
     found: SearchResult
@@ -69,7 +70,7 @@ class ModelFit:
 
     @property
     def correlation(self) -> dict[tuple[str, str], float]:
-        """Of pairs of free unknowns, by their names."""
+        """Correlations of pairs of free unknowns, by their names."""
         if self.regression is None:
             return {}
         free = np.flatnonzero(self.free)
@@ -88,41 +89,41 @@ def fit_model(
     starts: int = 3,
     display: Display = no_display,
 ) -> ModelFit:
-    """Fit from several starts, and say how sure each unknown is.
+    """Fit from several starts, with the uncertainty of each unknown.
 
     Args:
         units: SI units by name.
         residuals: of each recording, shape (n,), evenly spaced and in one unit, for values (SI) in
             the order of the unknowns.
 
-    Raises KeyboardInterrupt where it is interrupted: half a fit is none.
+    Raises KeyboardInterrupt when interrupted: an incomplete fit is not used.
     """
     objective = _objective(unknowns, residuals)
     settings = Settings(starts=starts, stated=False, tolerance=1e-6)
-    found = search(objective, settings, display)
-    if found.interrupted or found.jacobian is None or found.uncertainty is None:
+    best = search(objective, settings, display)
+    if best.interrupted or best.jacobian is None or best.uncertainty is None:
         raise KeyboardInterrupt
-    values = tuple(values_at(unknowns, found.shares))
+    values = tuple(values_at(unknowns, best.shares))
     left = tuple(residuals(values))
-    at_bound = np.array([bool(side) for side in found.uncertainty.bound])
-    free = ~at_bound & (np.linalg.norm(found.jacobian, axis=0) > 0.0)
-    regression = _regression(found.jacobian[:, free], left) if free.any() else None
+    at_bound = np.array([bool(side) for side in best.uncertainty.bound])
+    free = ~at_bound & (np.linalg.norm(best.jacobian, axis=0) > 0.0)
+    regression = _regression(best.jacobian[:, free], left) if free.any() else None
     open_ones = np.zeros(len(free), dtype=bool)
     if free.any():
-        open_ones[free] = covariance(found.jacobian[:, free], NULL, NULL)[1]
+        open_ones[free] = covariance(best.jacobian[:, free], NULL, NULL)[1]
     estimates = {
         unknown.name: _estimate(
-            unknown, units.get(unknown.name, ""), i, found, regression, free, bool(open_ones[i])
+            unknown, units.get(unknown.name, ""), i, best, regression, free, bool(open_ones[i])
         )
         for i, unknown in enumerate(unknowns)
     }
-    return ModelFit(found, estimates, values, left, regression, free)
+    return ModelFit(best, estimates, values, left, regression, free)
 
 
 def moved_with(fit: ModelFit, name: str, shift: float) -> dict[str, float]:
-    """How far the other free unknowns go (SI) when one is `shift` (SI) beside its best value.
+    """Shifts of the other free unknowns (SI) for a shift of one unknown by `shift` (SI).
 
-    Linearised at the optimum; empty where that unknown is not free.
+    Linearized at the optimum; empty where that unknown is not free.
     """
     unknowns, jacobian = fit.found.unknowns, fit.found.jacobian
     index = [unknown.name for unknown in unknowns].index(name)
@@ -130,8 +131,8 @@ def moved_with(fit: ModelFit, name: str, shift: float) -> dict[str, float]:
         return {}
     slopes = np.array([u.slope(float(s)) for u, s in zip(unknowns, fit.found.shares, strict=True)])
     others = [i for i in np.flatnonzero(fit.free) if i != index]
-    there = jacobian[:, index] * shift / slopes[index]
-    shares = -np.linalg.lstsq(jacobian[:, others], there, rcond=None)[0]
+    change = jacobian[:, index] * shift / slopes[index]
+    shares = -np.linalg.lstsq(jacobian[:, others], change, rcond=None)[0]
     moved = shares * slopes[others]
     return {unknowns[i].name: float(each) for i, each in zip(others, moved, strict=True)}
 
@@ -139,7 +140,7 @@ def moved_with(fit: ModelFit, name: str, shift: float) -> dict[str, float]:
 def refitted(
     unknowns: Sequence[Unknown], residuals: Residuals, begin: Array, used: Flags | None = None
 ) -> Values:
-    """Values (SI) of a further fit to other residuals, or to some, from the shares `begin`."""
+    """Values (SI) of a new fit to other or `used` residuals, from the shares `begin`."""
     settings = Settings(starts=1, stated=False, tolerance=1e-6)
     end = fit_from(_objective(unknowns, residuals), begin, settings, used=used)
     return values_at(unknowns, end.end)
@@ -151,12 +152,12 @@ def held_out(
     begin: Array,
     left_out: Sequence[Flags],
 ) -> tuple[Array, ...]:
-    """Residuals of rows that a further fit, from the shares `begin`, did not see.
+    """Residuals of the rows that a new fit, from the shares `begin`, does not use.
 
-    left_out: for each recording, shape (n,).
+    left_out: mask of these rows for each recording, shape (n,).
     """
-    found = residuals(refitted(unknowns, residuals, begin, ~np.concatenate(left_out)))
-    return tuple(own[mask] for own, mask in zip(found, left_out, strict=True))
+    errors = residuals(refitted(unknowns, residuals, begin, ~np.concatenate(left_out)))
+    return tuple(own[mask] for own, mask in zip(errors, left_out, strict=True))
 
 
 def _objective(unknowns: Sequence[Unknown], residuals: Residuals) -> Objective:

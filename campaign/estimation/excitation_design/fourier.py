@@ -137,7 +137,7 @@ def best_series(
         middle: angle around which it swings (rad): gravity depends on it.
 
     Raises ValueError for fewer than two harmonics, no room, a term that there is not, and terms
-    that no motion tells apart.
+    that no motion separates.
     """
     unknown = [name for name in terms if name not in TERMS or "temperature" in name]
     if unknown:

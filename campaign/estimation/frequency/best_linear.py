@@ -1,9 +1,9 @@
 """Best linear approximation from repeated multisines: the robust method.
 
-Over realisations of the phases everything scatters that is not linear, over periods only noise
-does; so the two are told apart (Pintelon and Schoukens, "System Identification: A Frequency Domain
-Approach" (2012), 4.3). A best linear approximation belongs to its excitation: its rms, band and
-distribution are part of what it says, and stand in the result.
+The scatter over realisations of the phases contains noise and nonlinear distortion; the scatter
+over periods contains only noise. Their comparison separates the two (Pintelon and Schoukens,
+"System Identification: A Frequency Domain Approach" (2012), 4.3). A best linear approximation
+applies to its excitation only. Therefore the result includes the rms, band and distribution.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.welch import Excited
 
 FEWEST_REALISATIONS = 7
-"""below which a variance over realisations is no weight for a fit (Pintelon, Schoukens: 4.3.1)."""
+"""Least number for which their variance is a weight for a fit (Pintelon, Schoukens: 4.3.1)."""
 
 
 NOTHING = 1e-9
@@ -29,15 +29,15 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True)
 class Excitation:
-    """What a best linear approximation belongs to.
+    """Excitation to which a best linear approximation applies.
 
     Attributes:
         rms: of the input without its mean, in its unit.
-        lowest, highest: of the excited lines (Hz).
-        lines: how many are excited.
+        lowest, highest: frequencies of the excited lines (Hz).
+        lines: number of excited lines.
         crest: largest value of the input over its rms, the mean over realisations.
         odd: whether no line of even number is excited.
-        unit: of the input, for people.
+        unit: unit of the input, for display.
     """
 
     rms: float
@@ -62,15 +62,15 @@ class Excitation:
 
 @dataclass(frozen=True)
 class BestLinear:
-    """The response at the excited lines, and what else the output holds.
+    """Response at the excited lines, with noise, distortion and transient of the output.
 
     Attributes:
-        response: its variance is that over realisations, noise and stochastic nonlinear part alike;
-            of a single realisation that of noise alone (see `undetermined`).
+        response: its variance over realisations contains noise and stochastic nonlinear part;
+            with a single realisation only noise (see `undetermined`).
         noise: variance of the response by noise, shape (n,); NaN for a single period.
-        distortion: what the output holds at detection lines; None for a single period.
-        transient: largest share of the output that transient or drift had at an excited line.
-        undetermined: what this measurement cannot tell, and why, in sentences.
+        distortion: output at the detection lines; None for a single period.
+        transient: largest share of transient or drift in the output at an excited line.
+        undetermined: sentences on what this measurement does not determine, and why.
     """
 
     response: MeasuredResponse
@@ -90,17 +90,18 @@ def best_linear(
     acts_on: Excited = "input",
     reference: Array | None = None,
 ) -> BestLinear:
-    """From whole periods of realisations, signals of shape (m, periods * samples) at `rate` (Hz).
+    """Best linear approximation from whole periods of m realisations.
 
-    The first period may hold the transient: it is told from the lines between those of the period.
+    The signals have the shape (m, periods * samples) at `rate` (Hz). The first period may contain
+    the transient: the lines between those of the period determine it.
 
     Args:
-        excited: lines of the period that the excitation has, rising, shape (k,).
-        acts_on: `input`: the input was decided outside; `reference`: the input is made by a loop,
-            and `reference` is what comes into it from outside, shape (m, periods * samples).
+        excited: excited lines of the period, ascending, shape (k,).
+        acts_on: `input`: the input is set from outside; `reference`: a loop generates the input,
+            and `reference` is the external signal of the loop, shape (m, periods * samples).
 
-    Raises ValueError for a loop without its reference, for shapes that do not fit, and where an
-    excited line has no input.
+    Raises ValueError for a loop without its reference, for different shapes, and for an excited
+    line without input.
     """
     if acts_on == "reference" and reference is None:
         raise ValueError(
@@ -113,18 +114,18 @@ def best_linear(
     if len({each.shape for each in signals}) > 1:
         raise ValueError("input, output and reference differ in shape")
     samples = signals[0].shape[1] // max(periods, 1)
-    found = line_spectra(np.stack(signals), rate, periods, (excited[-1] + 1.5) * rate / samples)
-    if len(found.frequency) < excited[-1]:
+    spectra = line_spectra(np.stack(signals), rate, periods, (excited[-1] + 1.5) * rate / samples)
+    if len(spectra.frequency) < excited[-1]:
         raise ValueError("the highest excited line lies above half the sampling rate")
-    leading = found.lines[2 if reference is not None else 0]
+    leading = spectra.lines[2 if reference is not None else 0]
     phase = leading / np.maximum(np.abs(leading), 1e-300)
-    response, noise = _response(found.conjugated(phase), excited - 1)
-    described = _excitation(signals[0], found, excited)
+    response, noise = _response(spectra.conjugated(phase), excited - 1)
+    described = _excitation(signals[0], spectra, excited)
     distortion = None
-    if found.noise is not None:
-        distortion = detected(found, found.noise, excited, response.values)
-    level = np.mean(np.abs(found.lines[1][:, excited - 1]), axis=0)
-    passing = np.mean(np.abs(found.transient[1][:, excited - 1]), axis=0)
+    if spectra.noise is not None:
+        distortion = detected(spectra, spectra.noise, excited, response.values)
+    level = np.mean(np.abs(spectra.lines[1][:, excited - 1]), axis=0)
+    passing = np.mean(np.abs(spectra.transient[1][:, excited - 1]), axis=0)
     return BestLinear(
         response,
         noise,
@@ -136,7 +137,7 @@ def best_linear(
 
 
 def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array]:
-    """Response, and its variance by noise."""
+    """Response at the lines `at`, and its variance by noise."""
     lines = found.lines[:2][..., at]
     realisations = lines.shape[1]
     mean = np.mean(lines, axis=1)
@@ -169,7 +170,7 @@ def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array]:
 
 
 def _spread(values: ComplexArray, covariance: ComplexArray, input_: ComplexArray) -> Array:
-    """Variance of output over input, of the covariance (k, 2, 2) of input and output."""
+    """Variance of output over input, from the covariance (k, 2, 2) of input and output."""
     row = np.stack([-values, np.ones_like(values)], axis=1)
     total = np.einsum("ka,kab,kb->k", row, covariance, np.conj(row)).real
     return np.asarray(np.maximum(total, 0.0) / np.abs(input_) ** 2)
@@ -193,22 +194,22 @@ def _excitation(input_: Array, found: LineSpectra, excited: Lines) -> Excitation
 
 
 def _undetermined(excitation: Excitation) -> tuple[str, ...]:
-    """What too few realisations and periods leave open."""
-    told = []
+    """Sentences on what too few realisations or periods do not determine."""
+    sentences = []
     if excitation.periods < 2:
-        told.append(
+        sentences.append(
             "A single period determines neither noise nor distortion nor transient: record two "
             "periods or more of each realisation."
         )
     if excitation.realisations < 2:
-        told.append(
+        sentences.append(
             "The nonlinear part of the variance is not determined by a single realisation: the "
             "response holds for these phases, and its intervals hold noise alone."
         )
     elif excitation.realisations < FEWEST_REALISATIONS:
-        told.append(
+        sentences.append(
             f"{excitation.realisations} realisations estimate the variance too roughly for the "
             f"weights of a fit: intervals of modes, margins and parameters need "
             f"{FEWEST_REALISATIONS}."
         )
-    return tuple(told)
+    return tuple(sentences)

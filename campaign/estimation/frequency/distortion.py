@@ -1,9 +1,9 @@
 """Even and odd distortion of the output at lines without excitation.
 
-What an amplifier or a loop puts at those lines itself is taken off through the response there
-(Pintelon and Schoukens (2012), 4.3.2). Odd distortion is at the excited lines as well, where it
-scatters over realisations. A single realisation does not show that: what the lines left out have
-then stands for all, which is off by several dB where one mode has most of the power.
+The input of an amplifier or a loop at those lines is subtracted by the response there (Pintelon and
+Schoukens (2012), 4.3.2). Odd distortion is also at the excited lines, where it scatters over
+realisations. A single realisation does not show that scatter: then the omitted lines represent all
+lines, with an error of several dB where one mode has most of the power.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ WITHIN_NOISE = Cause("within noise", "not more than the noise shows; a bound")
 
 @dataclass(frozen=True)
 class Level:
-    """The output at detection lines of one parity, corrected for the input there.
+    """Output at detection lines of one parity, corrected for the input there.
 
     Attributes:
         frequency: (Hz), shape (n,).
         power: squared rms of each line in each realisation, noise included, shape (m, n).
         noise: squared rms of the noise in one realisation, shape (n,).
-        noise_freedom: real degrees of freedom behind `noise` at each line.
-        shared: how many lines share what tells their noise.
+        noise_freedom: real degrees of freedom of `noise` at each line.
+        shared: number of lines with a common noise estimate.
         share: detection lines over all lines of that parity in the band.
-        recorded: squared rms of the output as it is, the input's own part included, shape (n,).
+        recorded: squared rms of the output without the correction, shape (n,).
     """
 
     frequency: Array
@@ -65,7 +65,7 @@ class Level:
 
     @property
     def rms(self) -> Array:
-        """Of each line without noise, zero where there is not more than that, shape (n,)."""
+        """Rms of each line without noise, zero where noise exceeds it, shape (n,)."""
         return np.asarray(np.sqrt(np.maximum(np.mean(self.power, axis=0) - self.noise, 0.0)))
 
     def interval(self, level: float = LEVEL) -> tuple[Array, Array]:
@@ -80,7 +80,7 @@ class Level:
 
     @property
     def significant(self) -> np.ndarray:
-        """Where there is more than noise, at 1 % for each line, shape (n,) of bool."""
+        """Whether each line exceeds noise, at 1 %, shape (n,) of bool."""
         from scipy.stats import f
 
         most = f.ppf(0.99, 2 * len(self.power), self.noise_freedom)
@@ -89,12 +89,12 @@ class Level:
 
 @dataclass(frozen=True)
 class Distortion:
-    """Both parities, and the output beside them.
+    """Distortion of both parities, with the output.
 
     Attributes:
-        between: odd distortion at the excited lines, as it scatters over realisations; None for a
+        between: odd distortion at the excited lines, from the scatter over realisations; None for a
             single realisation.
-        mixed: whether even lines are excited, too: then parities share lines.
+        mixed: whether even lines are also excited: then both parities have common lines.
         output: squared rms of the output at all excited lines together, shape (m,).
         excited: mean squared rms of the output at each excited line, shape (k,).
     """
@@ -139,14 +139,14 @@ def detected(
         level(odd, len(odd) / max(all_odd, 1)),
         np.sum(answered, axis=1),
         np.mean(answered, axis=0),
-        # Their mean has gone into the response.
+        # The response contains their mean.
         level(excited, 1.0, count / (count - 1)) if count > 1 else None,
         bool(np.any(excited % 2 == 0)),
     )
 
 
 def _all_odd(distortion: Distortion) -> Level:
-    """At the lines left out, and at the excited ones where realisations show it."""
+    """Odd distortion at the omitted lines, and at the excited lines with several realisations."""
     odd, between = distortion.odd, distortion.between
     if between is None:
         return odd
@@ -160,9 +160,9 @@ def _all_odd(distortion: Distortion) -> Level:
 
 
 def total(distortion: Distortion, parity: Parity) -> Estimate:
-    """Rms of all even or odd distortion in the band over that of the output, by its logarithm.
+    """Rms of all even or odd distortion in the band over that of the output, in the logarithm.
 
-    Where the interval of its power holds zero, it is a bound: at most that.
+    Where the interval of its power includes zero, it is an upper bound.
     """
     level = distortion.even if parity == "even" else _all_odd(distortion)
     name = f"{parity}_distortion"
@@ -178,13 +178,13 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
     )
     mean = float(np.mean(ratio))
     if count < 2:
-        # Lines of one set of phases are no independent draws: what they scatter holds too little.
+        # Lines of one set of phases are not independent: their scatter is too small.
         if mean <= 0:
             return _none(name, HIDDEN_IN_ONE())
         reason = SINGLE_ODD() if parity == "odd" else SINGLE_REALISATION()
         return Estimate.without_interval(name, math.sqrt(mean), "", reason, method=method)
     scatter = float(np.std(ratio, ddof=1)) / math.sqrt(count)
-    # The noise that is taken off is the same in all realisations.
+    # The noise estimate is common to all realisations.
     unsure = math.sqrt(float(np.sum(level.noise**2)) * 2.0 * level.shared / level.noise_freedom)
     noise = unsure / (max(level.share, 1e-300) * float(np.mean(distortion.output)))
     half = student(count - 1) * math.hypot(scatter, noise)
@@ -197,11 +197,11 @@ def total(distortion: Distortion, parity: Parity) -> Estimate:
 
 
 def _ends(ratio: Array, mean: float, error: float) -> tuple[float, float]:
-    """Of the root of the mean of positive powers, shape (m,), with its relative error.
+    """Interval of the root of the mean of positive powers, shape (m,), with its relative error.
 
-    Powers of few realisations are skewed: their mean lies low more often than high. So beside the
-    mean there is Cox's estimate of that of a log-normal distribution, and the hull of both
-    intervals counts (Zhou and Gao, Statistics in Medicine 16 (1997) 783).
+    Powers of few realisations are skewed: their mean is more often too low than too high. The
+    result is the hull of the intervals around the mean and around Cox's estimate for a log-normal
+    distribution (Zhou and Gao, Statistics in Medicine 16 (1997) 783).
     """
     count, logarithm = len(ratio), np.log(ratio)
     spread = float(np.var(logarithm, ddof=1))

@@ -32,14 +32,14 @@ UNITS = {
     "antiresonance_damping": "",
     "inertia_ratio": "",
 }
-"""Of the estimates of `TwoMass`."""
+"""Units of the estimates of `TwoMass`."""
 PARTS = ("motor_inertia", "load_inertia", "stiffness", "damping")
 Correlations = Mapping[tuple[str, str], float]
 
 
 @dataclass(frozen=True)
 class TwoMass:
-    """What the responses tell of a two-mass drive; what they do not is *not determined*.
+    """Two-mass drive; quantities that the responses do not determine are *not determined*.
 
     Attributes:
         motor_inertia, load_inertia, total_inertia: (kg m^2).
@@ -48,16 +48,16 @@ class TwoMass:
         resonance, antiresonance: undamped, sqrt(k (1/J1 + 1/J2)) and sqrt(k / J2) over 2 pi (Hz).
         antiresonance_damping: d / (2 sqrt(k J2)).
         inertia_ratio: J2 / J1.
-        misfit: why such a drive is no model of the responses; none where it may be one.
-        excess: weighted square over what a right model leaves in the mean.
+        misfit: why such a drive is no model of the responses; `NONE` where it may be one.
+        excess: weighted square over its expectation for a correct model.
         criterion: Schwarz' (BIC).
-        sides: that were measured.
+        sides: the measured sides.
         point: parameters of `model` and a delay for each side, shape (p,).
-        function: what was fitted instead, to a load alone or to one inertia.
-        rigid: whether one inertia explains the responses, so that no second one is told.
+        function: the fitted function of a load alone or of one inertia, instead of `model`.
+        rigid: whether one inertia explains the responses, so that they show no second one.
         grounded: whether a spring holds the motor, as friction does before it slides.
         covariance: of `point` by scatter, shape (p, p).
-        correlations: of the numbers by scatter, by pairs of their names.
+        correlations: of the estimates by scatter, by pairs of their names.
         condition: number of the weighted Jacobian, its columns scaled to length 1.
     """
 
@@ -84,14 +84,14 @@ class TwoMass:
     condition: float = math.nan
 
     def value(self, frequency: Array, side: Side) -> ComplexArray:
-        """The fitted response at `frequency` (Hz), shape (n,)."""
+        """Fitted response at `frequency` (Hz), shape (n,)."""
         if self.function is not None:
             return self.function.value(frequency)
         frequency = np.asarray(frequency, dtype=float)
         return model(frequency, self.point, side, self.delay(side))
 
     def delay(self, side: Side) -> float:
-        """Of the answer of that side (s); zero for one that was not measured."""
+        """Delay of the response of that side (s); zero for a side without a measurement."""
         if self.function is not None:
             return self.function.delay
         return float(self.point[7 + self.sides.index(side)]) if side in self.sides else 0.0
@@ -110,12 +110,12 @@ class TwoMass:
 
 
 def untold(names: Iterable[str], reason: Reason) -> dict[str, Any]:
-    """Estimates of these names that are not determined."""
+    """Estimates, not determined, of these names."""
     return {name: Estimate.without_interval(name, math.nan, UNITS[name], reason) for name in names}
 
 
 def correlations_of(names: Sequence[str], gradients: Array, spread: Array) -> Correlations:
-    """Of numbers with these gradients (k, p) by parameters of that covariance (p, p)."""
+    """Correlations of numbers from their gradients (k, p) and the parameters' covariance (p, p)."""
     together = gradients @ spread @ gradients.T
     error = np.sqrt(np.maximum(np.diag(together), 0.0))
     return {

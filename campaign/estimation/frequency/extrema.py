@@ -1,9 +1,9 @@
-"""Modes read between the lines of a response without a fitted function.
+"""Modes from the lines of a response without a fitted function.
 
-Of few realisations no variance weighs a fit. What the response still shows is between which of its
-lines the gain has an extremum: the interval ends at the nearest lines whose gain surely differs
-from that of the extremum, and so is never narrower than the spacing of the lines. No model of the
-drive enters, and the interval tells no standard error.
+With few realisations the variance is no weight for a fit. But the response shows between which of
+its lines the gain has an extremum. The interval ends at the nearest lines with a gain that surely
+differs from that of the extremum, and so is never narrower than the spacing of the lines. It needs
+no model of the drive and has no standard error.
 """
 
 from __future__ import annotations
@@ -20,15 +20,14 @@ from campaign.estimation.intervals import LEVEL
 from campaign.reason import Cause, Reason
 
 PROMINENCE = 1.5
-"""Ratio of gains, of that of a free inertia, by which an extremum stands out of its surroundings at
-least."""
+"""Least prominence of an extremum: ratio of gains, each over that of a free inertia."""
 SURELY = 2.0
-"""Standard deviations of a difference of two gains from which on they differ."""
+"""Standard deviations of a difference of two gains above which they differ."""
 BESIDE = 1.1
-"""Ratio of gains within which an undamped frequency may lie beside the extremum: a damped one, with
-damping ratio z, shifts by some z², and this is reached z / 2 beside it."""
+"""Ratio of gains within which the undamped frequency may differ from the extremum: damping with the
+ratio z shifts the extremum by about z², and this ratio is reached at a distance of z / 2."""
 TOGETHER = 3
-"""Neighbouring lines whose relative scatter counts as the same."""
+"""Number of neighboring lines over which relative scatter is averaged."""
 METHOD = "extremum of the measured gain, between the nearest lines whose gain surely differs"
 NO_SCATTER = Cause(
     "scatter of the lines not known",
@@ -43,16 +42,16 @@ NEEDS_A_FIT = Cause("needs a fitted function", "only a fitted function has a dam
 
 
 def extrema(frequency: Array, gain: Array, scatter: Array | None) -> tuple[Mode, Mode]:
-    """The resonance, and the antiresonance below it; not determined where none stands out.
+    """Resonance, and antiresonance below it; not determined where none is prominent.
 
     Args:
-        frequency: of the lines (Hz), rising, shape (n,).
-        gain: of torque to rate, shape (n,).
-        scatter: standard deviation of its logarithm, shape (n,); None where it is not known.
+        frequency: of the lines (Hz), ascending, shape (n,).
+        gain: from torque to rate, shape (n,).
+        scatter: standard deviation of its logarithm, shape (n,); None: unknown.
     """
     if scatter is None:
         return _none(NO_SCATTER(), is_zero=False), _none(NO_SCATTER(), is_zero=True)
-    level = np.log(np.maximum(gain, 1e-300) * frequency)  # flat of a free inertia
+    level = np.log(np.maximum(gain, 1e-300) * frequency)  # flat for a free inertia
     peak = _extremum(level, scatter)
     if peak is None:
         return _none(NO_EXTREMUM(), is_zero=False), _none(NO_EXTREMUM(), is_zero=True)
@@ -62,31 +61,31 @@ def extrema(frequency: Array, gain: Array, scatter: Array | None) -> tuple[Mode,
 
 
 def relative_scatter(best: BestLinear) -> Array | None:
-    """Standard deviation of the logarithm of the gain at each line, shape (n,); None: not known.
+    """Standard deviation of the logarithm of the gain at each line, shape (n,); None: unknown.
 
-    Noise and distortion together, as the odd lines show that the excitation left out.
+    Noise and distortion together, from the odd lines that the excitation omits.
     """
-    told = best.distortion
-    if told is None or told.mixed or not len(told.odd.frequency):
+    distortion = best.distortion
+    if distortion is None or distortion.mixed or not len(distortion.odd.frequency):
         return None
-    beside = np.interp(told.odd.frequency, best.response.frequency, told.excited)
-    square = np.mean(told.odd.power, axis=0) / beside / best.excitation.realisations
+    beside = np.interp(distortion.odd.frequency, best.response.frequency, distortion.excited)
+    square = np.mean(distortion.odd.power, axis=0) / beside / best.excitation.realisations
     around = np.pad(square, TOGETHER // 2, mode="edge")
     alike = np.convolve(around, np.full(TOGETHER, 1.0 / TOGETHER), "valid")
-    # Of a complex error the logarithm of the gain has one of two parts.
-    return np.interp(best.response.frequency, told.odd.frequency, np.sqrt(0.5 * alike))
+    # One of the two parts of a complex error is an error of the logarithm of the gain.
+    return np.interp(best.response.frequency, distortion.odd.frequency, np.sqrt(0.5 * alike))
 
 
 def _extremum(level: Array, scatter: Array) -> tuple[int, int, int] | None:
-    """Line of the most prominent maximum, and the nearest on each side that surely lie lower."""
+    """Most prominent maximum with the nearest surely lower lines: below, maximum, above."""
     from scipy.signal import find_peaks
 
-    peaks, told = find_peaks(level, prominence=math.log(PROMINENCE))
+    peaks, sizes = find_peaks(level, prominence=math.log(PROMINENCE))
     if not len(peaks):
         return None
-    most = int(np.argmax(told["prominences"]))
+    most = int(np.argmax(sizes["prominences"]))
     peak = int(peaks[most])
-    if told["prominences"][most] < math.log(PROMINENCE) + SURELY * scatter[peak]:
+    if sizes["prominences"][most] < math.log(PROMINENCE) + SURELY * scatter[peak]:
         return None
     apart = math.log(BESIDE) + SURELY * np.hypot(scatter, scatter[peak])
     lower = level + apart < level[peak]

@@ -1,10 +1,10 @@
 """Lines of periodic signals without transient and drift, with noise covariance.
 
-A record of P periods has P - 1 lines between two harmonics of its period: whatever nonlinear system
-it comes from, these hold transient and noise alone. A transient is smooth over frequency, so that a
-polynomial through the lines around a harmonic tells its part there, and what it leaves is noise
-(robust local polynomial method; Pintelon, Vandersteen, Schoukens and Rolain, Mech. Syst. Signal
-Process. 25 (2011) 2892; Pintelon and Schoukens (2012), 7.2).
+A record of P periods has P - 1 lines between two harmonics of its period. For any nonlinear system
+they contain only transient and noise. A transient is smooth over frequency: a polynomial through
+the lines around a harmonic estimates it there, and the residuals are noise (robust local polynomial
+method; Pintelon, Vandersteen, Schoukens and Rolain, Mech. Syst. Signal Process. 25 (2011) 2892;
+Pintelon and Schoukens (2012), 7.2).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from campaign.arrays import Array, ComplexArray
 
 ORDER = 2
-"""of the polynomial through the transient ..."""
+"""Order of the polynomial of the transient."""
 AROUND = 10
-"""... fitted to so many lines around a harmonic that belong to none."""
+"""Number of lines around a harmonic, without harmonics, that are fitted."""
 REACH = 2 * AROUND
-"""Lines to either side of a harmonic among which these are."""
+"""Largest distance of these lines from the harmonic, in lines."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class LineSpectra:
     Attributes:
         frequency: of the lines (Hz), shape (n,).
         lines: without transient, shape (c, m, n): a sine of amplitude a has |line| = a.
-        transient: what was taken off, shape (c, m, n); zero for a single period.
+        transient: the subtracted part, shape (c, m, n); zero for a single period.
         noise: covariance E[e e*] of `lines` in one realisation, shape (n, c, c), a mean over the
             realisations; None for a single period.
-        freedom: real degrees of freedom behind `noise`.
+        freedom: real degrees of freedom of `noise`.
         periods: of each realisation.
     """
 
@@ -48,11 +48,11 @@ class LineSpectra:
 
     @property
     def shared(self) -> float:
-        """How many lines are told their noise by one and the same line between harmonics."""
+        """Number of lines whose noise estimate uses the same line between harmonics."""
         return max(1.0, AROUND / max(self.periods - 1, 1))
 
     def conjugated(self, phase: ComplexArray) -> LineSpectra:
-        """Turned back by a phase for each realisation and line, |phase| = 1, shape (m, n)."""
+        """Rotate back by a phase for each realisation and line, |phase| = 1, shape (m, n)."""
         turned = self.lines * np.conj(phase)
         return LineSpectra(
             self.frequency, turned, self.transient, self.noise, self.freedom, self.periods
@@ -63,9 +63,9 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
     """Lines of signals of shape (c, m, periods * samples), sampled at `rate` (Hz).
 
     Args:
-        highest: frequency up to which lines are told (Hz).
+        highest: upper limit of the lines (Hz).
 
-    Raises ValueError where the length is no whole number of periods, or nothing is below `highest`.
+    Raises ValueError where the length is no whole number of periods, or no line is below `highest`.
     """
     total = signals.shape[-1]
     if periods < 1 or total % periods:
@@ -89,12 +89,12 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
         away, basis, inverse = _fitted_around(
             min(bin_, REACH + 1), periods, min(bins.shape[-1] - bin_, REACH + 1)
         )
-        there = bins[..., bin_ + away]
-        found = there @ inverse.T
-        transient[..., k] = found[..., 0]
-        left = there - found @ basis.T
+        around = bins[..., bin_ + away]
+        fit = around @ inverse.T
+        transient[..., k] = fit[..., 0]
+        left = around - fit @ basis.T
         spread = np.einsum("amj,bmj->ab", left, np.conj(left)) / (free * realisations)
-        # The transient taken off has noise of its own: that of `inverse` beside the line's.
+        # The subtracted transient adds its own noise, by `inverse`, to that of the line.
         noise[k] = spread * (1.0 + float(np.sum(inverse[0] ** 2)))
     return LineSpectra(
         frequency, own - transient, transient, noise, 2.0 * free * realisations, periods
@@ -103,10 +103,10 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
 
 @cache
 def _fitted_around(below: int, periods: int, above: int) -> tuple[NDArray[np.intp], Array, Array]:
-    """How far the lines lie from a harmonic that its polynomial is fitted to; basis and inverse.
+    """Distances of the fitted lines from a harmonic; basis and its inverse.
 
-    The nearest that belong to no harmonic and are not that of the mean, which lies `below` lines
-    lower, and within the spectrum, which ends `above` lines higher.
+    The nearest lines without harmonics and without the mean, which is `below` lines lower, within
+    the spectrum, which ends `above` lines higher.
     """
     away = np.arange(max(1 - below, -REACH), min(above, REACH + 1))
     away = away[away % periods != 0]

@@ -12,9 +12,9 @@ from campaign.estimation.frequency_response import Response
 from campaign.estimation.intervals import student
 
 ALIKE = 8.0
-"""Neighbours that a bias shifts alike: so many times its square counts against scatter in a fit."""
+"""Number of neighbors with a common bias: the factor of its square in the variance of a fit."""
 LEAST_FREEDOM = 5.0
-"""Below this a variance says too little for a weight: it needs more than 4."""
+"""Least degrees of freedom of a variance for a weight, which needs more than 4."""
 
 
 @dataclass(frozen=True)
@@ -22,14 +22,14 @@ class MeasuredResponse:
     """Output over input at n frequencies.
 
     Attributes:
-        frequency: rising (Hz), shape (n,).
+        frequency: ascending (Hz), shape (n,).
         values: complex, in the output's unit over the input's, shape (n,).
         variance: E|error|² of each value by scatter: both parts together, shape (n,).
-        freedom: real degrees of freedom behind `variance`, shape (n,); infinite where it is known.
-        coherence: share of the output's power that the excitation accounts for, shape (n,).
-        bias: what the method itself may do to a value, e.g. a window to a sharp mode: 1 sigma, size
-            of a complex error, shape (n,).
-        method: how it was found, in words.
+        freedom: real degrees of freedom of `variance`, shape (n,); infinite for an exact one.
+        coherence: share of the output's power that the excitation explains, shape (n,).
+        bias: possible error by the method, such as by a window at a sharp mode: 1 sigma, size of a
+            complex error, shape (n,).
+        method: description of the method.
     """
 
     frequency: Array
@@ -42,7 +42,7 @@ class MeasuredResponse:
 
     @staticmethod
     def of(response: Response, method: str = "sine by sine") -> MeasuredResponse:
-        """A response measured sine by sine; its errors count as known."""
+        """Response measured sine by sine; its errors count as exact."""
         n = len(response.frequency)
         return MeasuredResponse(
             response.frequency,
@@ -61,27 +61,27 @@ class MeasuredResponse:
 
     @property
     def widened(self) -> Array:
-        """`error` times Student's t over the normal quantile, for who knows of no freedom, (n,)."""
+        """`error` times Student's t over the normal quantile, for use without `freedom`, (n,)."""
         normal = student(np.inf)
         few = np.array([student(float(each)) for each in self.freedom]) / normal
         return np.asarray(np.sqrt(0.5 * (self.variance * few**2 + self.bias**2)))
 
     @property
     def response(self) -> Response:
-        """As the functions for sines take it; few degrees of freedom widen its errors."""
+        """As `Response`, with errors widened for few degrees of freedom."""
         return Response(self.frequency, self.values, self.widened, self.coherence)
 
     def at(self, kept: Flags | NDArray[np.intp] | slice) -> MeasuredResponse:
-        """Some of its points."""
+        """Some points of the response."""
         parts = ("frequency", "values", "variance", "freedom", "coherence", "bias")
         return replace(self, **{name: getattr(self, name)[kept] for name in parts})
 
     def between(self, lowest: float, highest: float) -> MeasuredResponse:
-        """Its points from `lowest` to `highest` (Hz)."""
+        """Points from `lowest` to `highest` (Hz)."""
         return self.at((self.frequency >= lowest) & (self.frequency <= highest))
 
     def times(self, factor: ComplexArray | Array) -> MeasuredResponse:
-        """The response times a known function, shape (n,): e.g. 2 pi i f makes angles rates."""
+        """Response times an exact function, shape (n,), such as 2 pi i f from angle to rate."""
         size = np.abs(factor)
         return replace(
             self,
@@ -95,5 +95,5 @@ def closed_from_open(loop: MeasuredResponse) -> MeasuredResponse:
     """T = L / (1 + L) of a measured open loop L with unit feedback."""
     rest = np.where(np.abs(1.0 + loop.values) > 0, 1.0 + loop.values, 1e-300)
     # dT = dL / (1 + L)².
-    found = loop.times(np.asarray(1.0 / rest**2))
-    return replace(found, values=loop.values / rest)
+    closed = loop.times(np.asarray(1.0 / rest**2))
+    return replace(closed, values=loop.values / rest)

@@ -26,12 +26,12 @@ OUTSIDE = Cause("outside of the band", "it lies outside of the measured frequenc
 
 @dataclass(frozen=True)
 class Mode:
-    """A pair of complex poles, or of zeros.
+    """A pair of complex poles or zeros.
 
     Attributes:
         frequency: natural frequency |root| / 2 pi (Hz).
         damping: damping ratio.
-        is_zero: an antiresonance.
+        is_zero: whether it is an antiresonance.
     """
 
     frequency: Estimate
@@ -40,30 +40,29 @@ class Mode:
 
 
 def modes(fit: RationalFit) -> tuple[Mode, ...]:
-    """Resonances and then antiresonances, each by frequency.
+    """Resonances, then antiresonances, each by frequency.
 
-    One outside of the measured frequencies is not determined; one of a function that does not fit
-    has no interval.
+    A mode outside the measured frequencies is not determined; a mode of a misfit has no interval.
     """
     up = len(fit.numerator)
     parts = (
         (fit.poles, fit.denominator, up, False),
         (fit.zeros, fit.numerator, 0, True),
     )
-    found = []
+    modes_of_both = []
     for roots, coefficients, first, is_zero in parts:
         pairs = [each for each in roots if each.imag > LEAST_IMAGINARY * abs(each)]
         part = slice(first, first + len(coefficients))
         for root in sorted(pairs, key=abs):
             by = root_jacobian(coefficients, fit.scale, complex(root))
-            found.append(_mode(fit, complex(root), by, fit.scatter[part, part], is_zero))
-    return tuple(found)
+            modes_of_both.append(_mode(fit, complex(root), by, fit.scatter[part, part], is_zero))
+    return tuple(modes_of_both)
 
 
 def chosen_modes(chosen: ChosenOrder) -> tuple[Mode, ...]:
-    """Those of the order chosen, with what others that are not ruled out say as a systematic part.
+    """Modes of the chosen order, with the difference to other likely orders as a systematic part.
 
-    Of another order the mode counts that is nearest, where it has one within a tenth.
+    The nearest mode of another order counts, if it is within `SAME`.
     """
     others = [modes(each) for each in chosen.near]
 
@@ -92,7 +91,7 @@ def _mode(
 ) -> Mode:
     size = abs(root)
     frequency, damping = size / (2.0 * math.pi), -root.real / size
-    # |r|, and -Re r / |r|, by the real and the imaginary part of r.
+    # Derivatives of |r| and of -Re r / |r|, by the coefficients.
     by_size = np.real(np.conj(root) * by) / size
     by_damping = -np.real(by) / size + root.real * by_size / size**2
     prefix = "antiresonance" if is_zero else "resonance"
@@ -101,26 +100,27 @@ def _mode(
         error = math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))
         return of_fit(name, value, unit, error, fit.misfit, METHOD)
 
-    found = Mode(
+    mode = Mode(
         estimate(prefix, frequency, "Hz", by_size / (2.0 * math.pi)),
         estimate(f"{prefix}_damping", damping, "", by_damping),
         is_zero,
     )
     if fit.lowest <= frequency <= fit.highest:
-        return found
+        return mode
     reason = OUTSIDE()
     return replace(
-        found,
-        frequency=replace(found.frequency, origin=Origin.NOT_DETERMINED, reason=reason),
-        damping=replace(found.damping, origin=Origin.NOT_DETERMINED, reason=reason),
+        mode,
+        frequency=replace(mode.frequency, origin=Origin.NOT_DETERMINED, reason=reason),
+        damping=replace(mode.damping, origin=Origin.NOT_DETERMINED, reason=reason),
     )
 
 
 def of_fit(
     name: str, value: float, unit: str, error: float, misfit: Reason, method: str
 ) -> Estimate:
-    """An estimate by a fit; without an interval where the fit is no model of the response, or no
-    parameter of it changes the value: it is at its bound, as of a resonance that nothing swings.
+    """Estimate from a fit; without an interval for a misfit, or at a bound.
+
+    A value is at its bound where its standard error is 0: no parameter changes it.
     """
     if misfit:
         return Estimate.without_interval(name, value, unit, MODEL_MISFIT(why=misfit), method=method)

@@ -1,9 +1,9 @@
 """Odd random-phase multisines: response, noise and distortion at once.
 
-Only odd lines of the base frequency are excited, and of every few of them one, drawn at random, is
-left out. What the output has there is odd distortion, at even lines even distortion; phases are
-independent and uniform, so that realisations average the rest (Pintelon and Schoukens, "System
-Identification: A Frequency Domain Approach" (2012), 3.5 and 4.3).
+Only odd lines of the base frequency are excited. In each group of a few lines one, drawn at random,
+is omitted. The output at omitted lines is odd distortion, at even lines even distortion. Phases are
+independent and uniform, so that a mean over realisations reduces the rest (Pintelon and Schoukens,
+"System Identification: A Frequency Domain Approach" (2012), 3.5 and 4.3).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from campaign.signals import MultiSine
 
 Lines = NDArray[np.int64]
 CREST_SAMPLES = 8
-"""times the highest line: samples of a period from which a crest factor is read."""
+"""Samples of a period over the highest line, for the crest factor."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class OddGrid:
 
     Attributes:
         period: (s).
-        excited: rising odd lines, shape (k,).
+        excited: ascending odd lines, shape (k,).
     """
 
     period: float
@@ -35,15 +35,15 @@ class OddGrid:
 
     @property
     def frequency(self) -> Array:
-        """Of the excited lines (Hz), shape (k,)."""
+        """Frequencies of the excited lines (Hz), shape (k,)."""
         return np.asarray(self.excited / self.period)
 
 
 def odd_grid(lowest: float, highest: float, period: float, seed: int, group: int = 3) -> OddGrid:
-    """Odd lines from `lowest` to `highest` (Hz), of every `group` one, drawn at random, left out.
+    """Odd lines from `lowest` to `highest` (Hz), without a random one of every `group` lines.
 
-    The first and the last line are never left out. Raises ValueError where fewer than three groups
-    fit, or for groups of one.
+    The first and the last line are always kept. Raises ValueError for fewer than three groups, or
+    for groups of one.
     """
     if group < 2:
         raise ValueError("a group has at least two lines: one is left out")
@@ -66,11 +66,11 @@ def odd_grid(lowest: float, highest: float, period: float, seed: int, group: int
 
 
 def random_phases(grid: OddGrid, rms: float, seed: int, draws: int = 1) -> MultiSine:
-    """One realisation: sines alike, of that rms together (in the unit of the input), with uniform
-    random phases.
+    """One realisation: sines of equal amplitude and uniform random phases, with a total `rms`.
 
-    draws: how many to draw, of which the one with the lowest crest factor is kept. Of a few tens
-        the phases still count as random; a search would make them depend on each other.
+    rms: in the unit of the input. draws: number of draws, of which the one with the lowest crest
+        factor is kept. With a few tens of draws the phases still count as random; a search would
+        make them dependent.
     """
     random = np.random.default_rng(seed)
     size = np.ones(len(grid.excited))
@@ -95,26 +95,26 @@ def _crest(lines: Lines, amplitude: Array, phases: Array) -> float:
 def course(
     lines: Lines, phases: Array, count: int, amplitudes: Array | float = 1.0, order: int = 0
 ) -> Array:
-    """One period of sines in `count` points, or its `order`-th integral but for its scale."""
+    """One period of sines in `count` points, or its `order`-th integral up to a scale."""
     spectrum = np.zeros(count // 2 + 1, dtype=complex)
     spectrum[lines] = amplitudes * np.exp(1j * (phases - 0.5 * np.pi)) / (1j * lines) ** order
     return np.asarray(np.fft.irfft(spectrum, count) * count / 2.0)
 
 
 ALIKE = 1e-3
-"""Mean square of the change from one period to the next, over twice the variance: a repetition."""
+"""Largest mean square change between periods, over twice the variance, of a repetition."""
 UNLIKE = 0.5
-"""What it comes to between repetitions, at least."""
+"""Least value of this ratio between repetitions."""
 LOOKED_AT = 1 << 21
-"""Samples at the end of a recording by which it is judged."""
+"""Samples at the end of a recording that are used."""
 STRONG, MANY = 0.2, 10
-"""Share of the largest line in amplitude, and how many such lines a multisine has at least."""
+"""Least amplitude of a strong line over the largest, and least number of them in a multisine."""
 
 
 def repetition(signal: Array) -> int | None:
-    """Samples of the period of a multisine, shape (n,), seen twice or more; None for all else.
+    """Samples per period of a multisine, shape (n,), with two or more periods; otherwise None.
 
-    A sine, a triangle and trapezoids repeat as well, and have few strong lines.
+    A sine, a triangle and trapezoids are also periodic, but have few strong lines.
     """
     signal = signal[-LOOKED_AT:]
     moving = signal - np.mean(signal)

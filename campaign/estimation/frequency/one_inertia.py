@@ -1,4 +1,4 @@
-"""Drives whose responses show less than two inertias."""
+"""Drives with responses that do not determine two inertias."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ NEGATIVE_INERTIA = Cause("negative inertia", "its inertia would be negative")
 NO_RESONANCE = Cause("no resonance in band", "no resonance of two inertias lies in the band")
 METHOD = "One inertia with viscous friction and a delay, least squares weighted by scatter"
 OF_ONE = ("total_inertia",)
-"""What one inertia has of a drive."""
+"""Quantities of a drive with one inertia."""
 AT_LOAD = (*OF_ONE, "resonance", "resonance_damping")
-"""What a sensor at the load alone tells."""
+"""Quantities that a sensor at the load alone determines."""
 
 
 def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
-    """One inertia: exp(-s delay) / (J s + b)."""
+    """Fit of one inertia: exp(-s delay) / (J s + b)."""
     fit = rational_fit(measured, (0, 1))
     up, down = float(fit.numerator[0]), fit.denominator
     unit = 2.0 * math.pi * fit.scale
@@ -51,10 +51,10 @@ def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
     misfit = fit.misfit
     if not misfit and inertia <= 0:
         misfit = NEGATIVE_INERTIA()
-    told = of_fit("total_inertia", inertia, "kg m^2", error, misfit, METHOD)
+    total = of_fit("total_inertia", inertia, "kg m^2", error, misfit, METHOD)
     return TwoMass(
         **untold(UNITS.keys() - OF_ONE, RIGID()),
-        total_inertia=told,
+        total_inertia=total,
         misfit=misfit,
         excess=fit.excess,
         criterion=fit.criterion,
@@ -69,14 +69,15 @@ def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
 
 
 def load_side_fit(measured: MeasuredResponse) -> TwoMass:
-    """What a rate at the load tells: by a function of third order with one zero and a delay.
+    """Fit to a rate at the load: a function of third order with one zero and a delay.
 
-    With friction at one of the inertias it is (d s + k) / (J1 J2 s³ + ... + b k), of which the sum
-    of the inertias and sqrt(k (1/J1 + 1/J2)) follow, and neither J1, J2 nor k.
+    With friction at one of the inertias it is (d s + k) / (J1 J2 s³ + ... + b k). It determines the
+    sum of the inertias and sqrt(k (1/J1 + 1/J2)), but neither J1, J2 nor k.
     """
     fit = rational_fit(measured, (1, 3))
     if fit.zeros[0].real > 0:
-        # A zero with as much delay less answers nearly alike, but no spring has negative damping.
+        # A right zero with less delay has almost the same response, but no spring has negative
+        # damping.
         mirrored = np.array([fit.numerator[0], -fit.numerator[1]])
         later = fit.delay + 2.0 / float(fit.zeros[0].real)
         fit = rational_fit(
@@ -93,16 +94,16 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
         return np.array([total / unit, rise / (2.0 * math.pi), -root.real / abs(root)])
 
     theta = np.concatenate([fit.numerator, fit.denominator, [fit.delay]])
-    found = told(theta)
+    values = told(theta)
     by = gradients(told, theta, np.maximum(1e-5 * np.abs(theta), 1e-12))
     error = propagated(by, fit.scatter)
     method = "function of third order with a delay, friction taken to be at one of the inertias"
     misfit = fit.misfit
-    if not misfit and (found[0] <= 0 or not fit.lowest <= found[1] <= fit.highest):
+    if not misfit and (values[0] <= 0 or not fit.lowest <= values[1] <= fit.highest):
         misfit = NO_RESONANCE()
     estimates: dict[str, Any] = {
         name: of_fit(name, float(value), UNITS[name], float(by_fit), misfit, method)
-        for name, value, by_fit in zip(AT_LOAD, found, error, strict=True)
+        for name, value, by_fit in zip(AT_LOAD, values, error, strict=True)
     }
     return TwoMass(
         **estimates,

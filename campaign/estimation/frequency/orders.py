@@ -1,7 +1,7 @@
 """Model order of a response by Schwarz' criterion, without unstable poles.
 
-What several orders explain about equally well they do not tell alike: that is a part of an
-interval, too, and no scatter shows it (`Chosen.near`).
+Orders with a similar fit result in different values. Intervals include this difference, which
+scatter does not show (`ChosenOrder.near`).
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from campaign.estimation.frequency.rational import RationalFit, delays_to_try, r
 from campaign.estimation.intervals import shifted_by
 
 HIGHEST = 6
-"""of the denominator, unless told otherwise."""
+"""Default highest order of the denominator."""
 FEWER_ZEROS = 3
-"""by which a numerator's order lies below the denominator's at most."""
+"""Largest difference of the orders of denominator and numerator."""
 NEAR = 2.0
-"""Schwarz' criterion within which two orders are told apart by how many parameters they have."""
+"""Difference of Schwarz' criterion within which the order with fewer parameters is chosen."""
 POSSIBLE = 10.0
-"""Above the best criterion up to which an order is not ruled out (Kass and Raftery, 1995)."""
+"""Difference from the best criterion within which an order is possible (Kass and Raftery, 1995)."""
 SURE = 2.0
-"""Standard errors by which a pole's real part must lie above zero to be unstable."""
+"""Least real part of an unstable pole, in standard errors."""
 INTEGRATOR = 0.5
-"""times the lowest frequency: a pole below that cannot be told from an integrator's."""
+"""Share of the lowest frequency below which a pole counts as an integrator."""
 
 
 @dataclass(frozen=True)
 class ChosenOrder:
-    """The fit chosen, and all that were tried, with why each other was not.
+    """The chosen fit, with all tried and refused orders.
 
     Attributes:
         tried: fits by order of numerator and denominator.
-        refused: why an order was left out.
-        near: other fits that the data do not rule out.
+        refused: reason by order.
+        near: other fits that the data do not exclude.
     """
 
     fit: RationalFit
@@ -49,15 +49,15 @@ class ChosenOrder:
 
 
 def order_of(fit: RationalFit) -> tuple[int, int]:
-    """Of numerator and denominator."""
+    """Orders of numerator and denominator."""
     return len(fit.numerator) - 1, len(fit.denominator) - 1
 
 
 def chosen_order(measured: MeasuredResponse, highest: int = HIGHEST) -> ChosenOrder:
-    """Fits of all orders up to `highest`, and the one with the lowest criterion.
+    """Fits of all orders up to `highest`, with the choice by the criterion.
 
-    Orders are tried upwards, until two in a row of the denominator's bring no better criterion.
-    Raises ValueError where none can be fitted, or all are refused, as those with an unstable pole.
+    The search ends after two consecutive orders of the denominator without a better criterion.
+    Raises ValueError where no order has a fit, or all are refused (such as for an unstable pole).
     """
     tried: dict[tuple[int, int], RationalFit] = {}
     refused: dict[tuple[int, int], str] = {}
@@ -92,14 +92,14 @@ def chosen_order(measured: MeasuredResponse, highest: int = HIGHEST) -> ChosenOr
 
 
 def with_order(estimate: Estimate, others: Sequence[float]) -> Estimate:
-    """The estimate with what other orders, which the data do not rule out, say of it.
+    """Add the difference to the values of other possible orders as a systematic part.
 
-    The largest deviation counts as the half-width of a uniform distribution.
+    The largest difference is the half-width of a uniform distribution.
     """
-    told = [abs(each - estimate.value) for each in others if math.isfinite(each)]
-    if not told or not estimate.has_interval:
+    shifts = [abs(each - estimate.value) for each in others if math.isfinite(each)]
+    if not shifts or not estimate.has_interval:
         return estimate
-    return shifted_by(estimate, "order of the function", max(told) / math.sqrt(3.0))
+    return shifted_by(estimate, "order of the function", max(shifts) / math.sqrt(3.0))
 
 
 def _unusable(fit: RationalFit) -> str:

@@ -1,10 +1,9 @@
 """Output error of a fitted response for a recorded input.
 
-The spectrum of the input times the response is the output that a periodic input would have left;
-what begins and ends otherwise differs from it by free motions of the function's poles (Pintelon and
-Schoukens (2012), 2.6.3), which are fitted with an offset and a drift. Both sides are seen through
-one zero-phase filter over the band that was fitted: further down, friction and offsets of the
-torque move a drive away from any simulation.
+The spectrum of the input times the response is the output for a periodic input. Any other output
+differs from it by free motions of the function's poles (Pintelon and Schoukens (2012), 2.6.3),
+which are fitted with an offset and a drift. Both sides have the same zero-phase filter over the
+fitted band: at lower frequencies, friction and offsets of the torque dominate the motion.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_positive_repeats
 
 ORDER = 3
-"""of the Butterworth filter, which runs forward and backward."""
+"""Order of the Butterworth filter, which runs forward and backward."""
 FEWEST_PARTS = 8
-"""into which recordings are cut, at least, for an interval."""
+"""Fewest parts of the recordings for an interval."""
 PERIODS = 3.0
-"""of the lowest frequency that a part is long, at least."""
+"""Least length of a part, in periods of the lowest frequency."""
 LONGEST = 700.0
 """Largest exponent of a free motion."""
 
@@ -34,7 +33,7 @@ class Simulated:
 
     Attributes:
         time: (s).
-        measured, simulated: filtered alike, without their ends.
+        measured, simulated: with the same filter, without their ends.
     """
 
     time: Array
@@ -57,11 +56,11 @@ def simulated_output(
     lowest: float,
     highest: float,
 ) -> Simulated:
-    """The output of an input, evenly sampled at `rate` (Hz), shape (n,).
+    """Simulate the output of an input, evenly sampled at `rate` (Hz), shape (n,).
 
     Args:
         response: output over input at frequencies (Hz), shape (n,).
-        poles: of it (rad/s).
+        poles: of the response (rad/s).
         lowest, highest: of the band (Hz).
 
     Raises ValueError for a recording shorter than three periods of `lowest`, or a band above half
@@ -86,22 +85,22 @@ def simulated_output(
     )
     band = butter(ORDER, (lowest, highest), "bandpass", fs=rate, output="sos")
     filtered = sosfiltfilt(band, columns, axis=0)
-    # Filter and period both show at the ends.
+    # The ends contain transients of the filter and of the assumed period.
     cut = round(PERIODS * rate / lowest / 2.0)
     inner = filtered[cut : n - cut]
     periodic, measured, free = inner[:, 0], inner[:, 1], inner[:, 2:]
-    found, *_ = np.linalg.lstsq(free, measured - periodic, rcond=1e-8)
-    return Simulated(time[cut : n - cut], measured, periodic + free @ found)
+    sizes, *_ = np.linalg.lstsq(free, measured - periodic, rcond=1e-8)
+    return Simulated(time[cut : n - cut], measured, periodic + free @ sizes)
 
 
 def _free(poles: ComplexArray, time: Array) -> list[Array]:
-    """Free motions, largest 1, with an offset and a drift."""
-    found = [np.ones_like(time), time / time[-1]]
+    """Free motions with the largest value 1, with an offset and a drift."""
+    motions = [np.ones_like(time), time / time[-1]]
     for pole in poles[poles.imag >= 0.0]:
         begin = time if pole.real <= 0.0 else time - time[-1]
         motion = np.exp(np.clip(pole.real * begin, -LONGEST, 0.0)) * np.exp(1j * pole.imag * time)
-        found += [motion.real, motion.imag] if pole.imag > 0.0 else [motion.real]
-    return found
+        motions += [motion.real, motion.imag] if pole.imag > 0.0 else [motion.real]
+    return motions
 
 
 def output_error(name: str, simulated: Sequence[Simulated], lowest: float) -> Estimate:

@@ -50,12 +50,12 @@ class HeldAgainst:
 
     @property
     def in_deviations(self) -> Array:
-        """Size of the difference over what one expects of it, shape (n,): 1 in the mean square."""
+        """Size of the difference over its expectation, shape (n,): 1 in the mean square."""
         return np.asarray(np.abs(self.difference) / (math.sqrt(2.0) * self.deviation))
 
     @property
     def verdict(self) -> str:
-        """Whether the model predicts it, in words."""
+        """Whether the model predicts the measurement, as text."""
         if self.reason:
             return f"not determined: {self.reason}"
         if self.square <= self.most:
@@ -66,7 +66,7 @@ class HeldAgainst:
 def held_against(
     measured: MeasuredResponse, predicted: ComplexArray, jacobian: ComplexArray, covariance: Array
 ) -> HeldAgainst:
-    """A prediction and its covariance against a measured response.
+    """Compare a prediction and its covariance with a measured response.
 
     Args:
         predicted: shape (n,). jacobian: its derivative by the parameters, shape (n, p).
@@ -81,7 +81,7 @@ def held_against(
         return HeldAgainst(measured, predicted, nothing, math.nan, math.nan, NO_DEVIATION())
     stacked = np.concatenate([jacobian.real, jacobian.imag])
     shared = stacked @ covariance @ stacked.T
-    # Variances that are estimates are too small in their inverse mean.
+    # Estimated variances need this factor, because the mean of their inverse is too large.
     own = np.concatenate([weights.error, weights.error]) ** 2 * weights.mean
     together = shared + np.diag(own)
     apart = np.concatenate([left.real, left.imag])

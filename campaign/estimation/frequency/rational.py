@@ -2,10 +2,10 @@
 
     G(s) = exp(-s delay) * (b0 + b1 s' + ...) / (a0 + a1 s' + ...),    s' = s / (2 pi scale)
 
-Started by Sanathanan and Koerner's iteration (IEEE Trans. AC-8 (1963) 56) for several delays, then
-refined by Levenberg's and Marquardt's to the smallest weighted square, which is the maximum
-likelihood of errors of known variance (Pintelon and Schoukens, "System Identification: A Frequency
-Domain Approach" (2012), 9.11).
+Start: Sanathanan and Koerner's iteration (IEEE Trans. AC-8 (1963) 56) for several delays. Then the
+Levenberg-Marquardt method minimizes the weighted square, which is maximum likelihood for errors of
+known variance (Pintelon and Schoukens, "System Identification: A Frequency Domain Approach" (2012),
+9.11).
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from campaign.estimation.least_squares import covariance, minimum
 from campaign.reason import NONE, Cause, Reason
 
 SANATHANAN = 8
-"""iterations before a refinement."""
+"""Iterations before the refinement."""
 DELAYS = 6
-"""Values of the delay that a fit is started from."""
+"""Number of delays from which a fit starts."""
 EXACT = 1e-6
-"""Share of a value below which no error is believed: what a fit's arithmetic resolves."""
+"""Least relative error of a value: the resolution of the fit's arithmetic."""
 MOST_EXCESS = 2.0
 """Weighted square over its expectation above which a function is no model of the response."""
 SURE = 3.3
-"""Standard deviations of a statistic above which it is no chance (0.05 %, one-sided)."""
+"""Standard deviations above which a statistic is significant (0.05 %, one-sided)."""
 LARGE_RESIDUALS = Cause(
     "residuals too large", "it leaves {times:.1f} times the square that scatter would"
 )
@@ -42,11 +42,11 @@ ALIKE_RESIDUALS = Cause(
 
 @dataclass(frozen=True)
 class Weights:
-    """How a weighted square is judged whose variances are estimates themselves.
+    """Weights of a fit, with the statistics of a weighted square for estimated variances.
 
     Attributes:
         error: standard deviation of either part of each value, shape (n,).
-        mean: expectation of one squared, weighted residual of a right model.
+        mean: expectation of one squared, weighted residual of a correct model.
         spread: variance of the sum of the two squares of one value.
         inflation: of a covariance by the scatter of the weights.
     """
@@ -58,7 +58,7 @@ class Weights:
 
     @staticmethod
     def of(measured: MeasuredResponse) -> Weights:
-        """Raises ValueError where variances have too few degrees of freedom, or there are none."""
+        """Raises ValueError for variances that are missing or have too few degrees of freedom."""
         freedom = float(np.min(measured.freedom, initial=math.inf))
         if not np.all(np.isfinite(measured.variance)) or freedom < LEAST_FREEDOM:
             raise ValueError(
@@ -86,9 +86,9 @@ class RationalFit:
         scale: (Hz).
         covariance: of (numerator, denominator, delay), shape (p, p); not yet with `excess`.
         residuals: weighted, complex, shape (n,); squares of either part are 1 in the mean.
-        excess: weighted square over what a right model leaves in the mean.
-        misfit: why it is no model of the response; none where it may be one.
-        parameters: how many are free.
+        excess: weighted square over its expectation for a correct model.
+        misfit: why it is no model of the response; `NONE` where it may be one.
+        parameters: number of free parameters.
         lowest, highest: of the frequencies (Hz).
         condition: number of the weighted Jacobian, its columns scaled to length 1.
     """
@@ -128,17 +128,17 @@ class RationalFit:
 
     @cached_property
     def scatter(self) -> Array:
-        """Covariance of (numerator, denominator, delay), with what the fit leaves over."""
+        """Covariance of (numerator, denominator, delay), including `excess`."""
         return np.asarray(self.covariance * max(self.excess, 1.0))
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """(rad/s)."""
+        """Poles (rad/s)."""
         return _roots(self.denominator, self.scale)
 
     @cached_property
     def zeros(self) -> ComplexArray:
-        """(rad/s)."""
+        """Zeros (rad/s)."""
         return _roots(self.numerator, self.scale)
 
     @property
@@ -150,12 +150,12 @@ class RationalFit:
 
 
 def _roots(coefficients: Array, scale: float) -> ComplexArray:
-    found = np.polynomial.polynomial.polyroots(coefficients)
-    return np.asarray(found * (2.0 * np.pi * scale), dtype=complex)
+    roots = np.polynomial.polynomial.polyroots(coefficients)
+    return np.asarray(roots * (2.0 * np.pi * scale), dtype=complex)
 
 
 def _powers(s: ComplexArray, numerator: Array, denominator: Array) -> ComplexArray:
-    """Powers of s, shape (n, most coefficients)."""
+    """Powers of s, shape (n, larger number of coefficients)."""
     return np.asarray(s[:, None] ** np.arange(max(len(numerator), len(denominator))))
 
 
@@ -173,12 +173,12 @@ def rational_fit(
     delays: Array | None = None,
     start: Array | None = None,
 ) -> RationalFit:
-    """The function of that order (of numerator and denominator) that fits best.
+    """Best fit of a function of an order (of numerator and denominator).
 
     Args:
         measured: at n frequencies, with a variance of enough degrees of freedom.
-        delays: (s) to start from; absent: from none to what the phase falls at the upper end.
-        start: (numerator, denominator, delay) to start from instead.
+        delays: start values (s); default: `delays_to_try`.
+        start: start value (numerator, denominator, delay) instead.
 
     Raises ValueError for too few frequencies, a numerator above the denominator, or variances that
     are no weights.
@@ -210,7 +210,7 @@ def rational_fit(
 
 
 def delays_to_try(measured: MeasuredResponse) -> Array:
-    """From none to 1.2 times what the phase falls over the upper third of the band (s)."""
+    """Delays (s) from 0 to 1.2 times the phase slope in the upper third of the band."""
     upper = measured.frequency >= measured.frequency[-1] * 2.0 / 3.0
     most = 0.0
     if np.count_nonzero(upper) > 3:
@@ -223,7 +223,7 @@ def delays_to_try(measured: MeasuredResponse) -> Array:
 def _sanathanan(
     s: ComplexArray, values: ComplexArray, error: Array, order: tuple[int, int]
 ) -> Array:
-    """Coefficients (numerator, denominator), of norm 1."""
+    """Start coefficients (numerator, denominator), of norm 1."""
     up, down = order
     powers = s[:, None] ** np.arange(down + 1)
     linear = np.column_stack([powers[:, : up + 1], -values[:, None] * powers])
@@ -234,13 +234,13 @@ def _sanathanan(
         stacked = np.concatenate([weighted.real, weighted.imag])
         length = np.maximum(np.linalg.norm(stacked, axis=0), 1e-300)
         _, _, right = np.linalg.svd(stacked / length, full_matrices=False)
-        found = right[-1] / length
-        found = found / np.linalg.norm(found)
-        previous = np.maximum(np.abs(powers @ found[up + 1 :]), 1e-12)
-        left = (linear @ found) / (error * previous)
+        theta = right[-1] / length
+        theta = theta / np.linalg.norm(theta)
+        previous = np.maximum(np.abs(powers @ theta[up + 1 :]), 1e-12)
+        left = (linear @ theta) / (error * previous)
         square = float(np.sum(np.abs(left) ** 2))
         if square < least:
-            best, least = found, square
+            best, least = theta, square
     return best
 
 
@@ -253,11 +253,11 @@ def _model(theta: Array, s: ComplexArray, up: int, scale: float) -> ComplexArray
 
 
 def _polynomial(s: ComplexArray, coefficients: Array) -> ComplexArray:
-    """Horner's scheme, as numpy's `polyval` has it, which looks at its arguments for longer."""
-    found = coefficients[-1] + s * 0.0
+    """Polynomial by Horner's scheme: as numpy's `polyval`, without its checks of arguments."""
+    value = coefficients[-1] + s * 0.0
     for coefficient in coefficients[-2::-1].tolist():
-        found = coefficient + found * s
-    return np.asarray(found)
+        value = coefficient + value * s
+    return np.asarray(value)
 
 
 def _refined(
@@ -269,7 +269,7 @@ def _refined(
     start: Array,
 ) -> RationalFit:
     values, error = measured.values, weights.error
-    # The largest term of the denominator is held: a common factor of all coefficients is free.
+    # The largest term of the denominator is fixed, because a common factor is arbitrary.
     down = len(start) - up - 3
     powers = np.abs(s[:, None]) ** np.arange(down + 1)
     held = up + 1 + int(np.argmax(np.max(powers, axis=0) * np.abs(start[up + 1 : -1])))
@@ -289,14 +289,14 @@ def _refined(
     scaled = start / size
     low[held] = high[held] = scaled[held]
     with np.errstate(all="ignore"):
-        found = minimum(function, scaled, low, high, steps=200)
+        best = minimum(function, scaled, low, high, steps=200)
     free = np.setdiff1d(np.arange(len(start)), held)
-    inner, _ = covariance(found.jacobian[:, free])
+    inner, _ = covariance(best.jacobian[:, free])
     spread = np.zeros((len(start), len(start)))
     spread[np.ix_(free, free)] = inner * np.outer(size[free], size[free]) * weights.inflation
-    theta = found.point * size
+    theta = best.point * size
     n = len(values)
-    parts = found.residuals / math.sqrt(weights.mean)
+    parts = best.residuals / math.sqrt(weights.mean)
     residuals: ComplexArray = np.asarray(parts[:n] + 1j * parts[n:], dtype=complex)
     excess, misfit = judged_fit(residuals, len(free), weights)
     return RationalFit(
@@ -311,12 +311,12 @@ def _refined(
         len(free),
         float(measured.frequency[0]),
         float(measured.frequency[-1]),
-        condition_of(found.jacobian[:, free]),
+        condition_of(best.jacobian[:, free]),
     )
 
 
 def condition_of(jacobian: Array) -> float:
-    """Condition number of columns of unit length, so that no unit of a parameter decides."""
+    """Condition number with columns scaled to length 1; independent of the parameters' units."""
     length = np.linalg.norm(jacobian, axis=0)
     if not np.all(np.isfinite(length)) or not np.all(length > 0):
         return math.inf
@@ -324,7 +324,7 @@ def condition_of(jacobian: Array) -> float:
 
 
 def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tuple[float, Reason]:
-    """Weighted square over its expectation, and why a model is none of the response, or nothing.
+    """Weighted square over its expectation, and the reason of a misfit or `NONE`.
 
     Args:
         residuals: weighted, shape (n,); squares of either part are 1 in the mean.
@@ -335,7 +335,7 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
     excess = square / left
     chance = math.sqrt(n * weights.spread) / weights.mean / left
     together = float(np.real(np.sum(residuals[1:] * np.conj(residuals[:-1])))) / max(square, 1e-300)
-    # Of white residuals this has a standard deviation of 1 / sqrt(2 n), and a model takes some off.
+    # For white residuals its standard deviation is 1 / sqrt(2 n), less after a fit.
     alike = together * math.sqrt(2.0 * n)
     if excess > MOST_EXCESS and excess > 1.0 + SURE * chance:
         return excess, LARGE_RESIDUALS(times=excess)
@@ -345,5 +345,5 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
 
 
 def thinned(measured: MeasuredResponse, every: int) -> MeasuredResponse:
-    """Every so many points: lines of a window whose neighbours know of each other (Hann: 2)."""
+    """Every n-th point, for windows with correlated neighboring lines (Hann: 2)."""
     return measured.at(slice(None, None, max(every, 1)))

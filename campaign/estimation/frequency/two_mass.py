@@ -2,10 +2,10 @@
 
     J1 w1' = T - b1 w1 - kg x1 - tau,    J2 w2' = tau - b2 w2,    tau = k (x1 - x2) + d (w1 - w2)
 
-with the torque at the motor. What a sensor's place tells: at the motor the antiresonance
-sqrt(k / J2) and the resonance sqrt(k (1/J1 + 1/J2)), and so with a torque in N m all of J1, J2, k
-and d. At the load the antiresonance is not there: only the resonance, its damping and J1 + J2 are
-told, and infinitely many J1, J2 and k have the same three.
+with the torque at the motor. A sensor at the motor shows the antiresonance sqrt(k / J2) and the
+resonance sqrt(k (1/J1 + 1/J2)): with a torque in N m they determine J1, J2, k and d. A sensor at
+the load shows no antiresonance: it determines only the resonance, its damping and J1 + J2, which
+infinitely many J1, J2 and k have in common.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ from campaign.estimation.least_squares import (
 from campaign.reason import Cause
 
 ROUGH = 10
-"""Steps after which most starts are given up ..."""
+"""Steps after which most starts are discarded."""
 KEPT = 3
-"""... and how many are followed to the end."""
+"""Number of starts that are followed to the end."""
 LARGEST = 50.0
-"""Logarithm of an inertia or a stiffness (SI), either way, that no drive has."""
+"""Bound of the absolute logarithm of an inertia or a stiffness (SI), beyond that of any drive."""
 WIDEST_RATIO = 8.0
-"""Largest logarithm of J2 / J1, either way."""
+"""Bound of the absolute logarithm of J2 / J1."""
 METHOD = "Two inertias on a spring with viscous friction, least squares weighted by scatter"
 OPEN_COMBINATION = Cause(
     "combination left open",
@@ -66,22 +66,22 @@ def two_mass(
     torque_uncertainty: float | None = None,
     rigid: bool | None = None,
 ) -> TwoMass:
-    """The drive whose responses fit best, with or without a spring that holds the motor.
+    """Drive with the best fit of its responses, with or without a spring from motor to ground.
 
     Args:
-        responses: of torque at the motor (N m) to rate (rad/s), by where the rate was measured.
+        responses: from torque at the motor (N m) to rate (rad/s), by the place of the rate sensor.
         torque_uncertainty: relative standard uncertainty of the torque (torque constant), a
-            systematic part of all that is in N m.
-        rigid: whether it is one inertia; None: where that explains the response of a sensor.
+            systematic part of all values in N m.
+        rigid: whether it is one inertia; None: decided by the response of a single sensor.
 
-    A fit that leaves more than scatter is *misfit*: values without intervals.
+    A fit with residuals above scatter is a *misfit*: values without intervals.
     Raises ValueError for variances that are no weights, or too few frequencies.
     """
     if not responses:
         raise ValueError("no response of a motor or a load")
     if set(responses) == {"load"}:
-        found = _or_rigid(load_side_fit(responses["load"]), responses, rigid)
-        return _with_torque(found, torque_uncertainty)
+        drive = _or_rigid(load_side_fit(responses["load"]), responses, rigid)
+        return _with_torque(drive, torque_uncertainty)
     free = two_mass_fit(responses, False)
     held = two_mass_fit(responses, True)
     best = held if held.criterion < free.criterion - 6.0 else free
@@ -93,9 +93,9 @@ def two_mass(
 def _or_rigid(
     found: TwoMass, responses: Mapping[Side, MeasuredResponse], rigid: bool | None
 ) -> TwoMass:
-    """One inertia where that explains the response of a sensor as well, by Schwarz' criterion.
+    """One inertia where it fits the response of a single sensor better, by Schwarz' criterion.
 
-    Or where it is no misfit, and of two the resonance is not determined within what was measured.
+    Also where two masses have no resonance in the measured band. One inertia must be no misfit.
     """
     if len(responses) > 1 or rigid is False:
         return found
@@ -109,7 +109,7 @@ def _or_rigid(
 
 
 def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> TwoMass:
-    """As `two_mass`, of one of the two structures, with a torque that is known."""
+    """As `two_mass`, for one of the two structures and a torque without uncertainty."""
     sides: tuple[Side, ...] = tuple(sorted(responses, reverse=True))  # motor before load
     weights = [Weights.of(responses[side]) for side in sides]
     size = sizes(responses, sides)
@@ -122,8 +122,8 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
         point, left, by = scaled * size, [], []
         for k, (side, weight) in enumerate(zip(sides, weights, strict=True)):
             measured, error = responses[side], weight.error * math.sqrt(weight.mean)
-            found = model(measured.frequency, point, side, float(point[7 + k]))
-            left.append((found - measured.values) / error)
+            values = model(measured.frequency, point, side, float(point[7 + k]))
+            left.append((values - measured.values) / error)
             change = model_jacobian(measured.frequency, point, sides, side)
             by.append(change * size / error[:, None])
         all_left, all_by = np.concatenate(left), np.concatenate(by)
@@ -149,7 +149,7 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
     inner, open_ = covariance(best.jacobian[:, free])
     spread = np.zeros((len(size), len(size)))
     inflation = max(weight.inflation / weight.mean for weight in weights)
-    # Noise of the torque and leakage are the same ones in what both sensors show.
+    # Both sensors have the same torque noise and leakage.
     inflation *= len(sides)
     spread[np.ix_(free, free)] = inner * np.outer(size[free], size[free]) * inflation
     point = best.point * size
@@ -160,10 +160,10 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
         misfit = OPEN_COMBINATION()
     spread *= max(excess, 1.0)
     by = gradients(_numbers, point, np.maximum(1e-4 * np.abs(point), 1e-9))
-    told = zip(UNITS.items(), _numbers(point), propagated(by, spread), strict=True)
+    rows = zip(UNITS.items(), _numbers(point), propagated(by, spread), strict=True)
     estimates: dict[str, Any] = {
         name: of_fit(name, float(value), unit, float(error), misfit, METHOD)
-        for (name, unit), value, error in told
+        for (name, unit), value, error in rows
     }
     return TwoMass(
         **estimates,
@@ -184,7 +184,7 @@ def _cost(found: Minimum) -> float:
 
 
 def _numbers(point: Array) -> Array:
-    """Those of `UNITS` that follow from a point, shape (10,)."""
+    """Quantities of `UNITS` at a point, shape (10,)."""
     first, ratio, spring = np.exp(point[:3])
     second, damping = first * ratio, point[3]
     rise = math.sqrt(spring * (1.0 / first + 1.0 / second)) / (2.0 * math.pi)
@@ -197,7 +197,7 @@ def _numbers(point: Array) -> Array:
 
 
 def _with_torque(found: TwoMass, uncertainty: float | None) -> TwoMass:
-    """With the relative uncertainty of the torque as a systematic part of all that is in N m."""
+    """Add the relative uncertainty of the torque as a systematic part of all values in N m."""
     changed: dict[str, Any] = {
         name: shifted_by(each, TORQUE_CONSTANT, abs(each.value) * uncertainty)
         for name in (*PARTS, "total_inertia")

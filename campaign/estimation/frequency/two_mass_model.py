@@ -13,18 +13,18 @@ from campaign.estimation.frequency.rational import delays_to_try
 
 Side = Literal["motor", "load"]
 STARTS = 8
-"""Best places of a grid that a fit is started from."""
+"""Number of best points of a grid from which a fit starts."""
 RATIOS = (0.25, 0.4, 0.55, 0.7, 0.82, 0.92, 0.97)
-"""Antiresonance over resonance at which it is started."""
+"""Antiresonance over resonance on the grid."""
 DAMPINGS = (0.01, 0.05, 0.2)
-"""Damping ratios of the antiresonance at which it is started."""
+"""Damping ratios of the antiresonance on the grid."""
 
 
 def model(frequency: Array, point: Array, side: Side, delay: float) -> ComplexArray:
     """Rate over torque at `frequency` (Hz), shape (n,).
 
-    `point` begins with log J1, log (J2 / J1), log k, d, b1, b2, kg (SI); of m points, shape
-    (7, m, 1), the responses are (m, n).
+    `point` begins with log J1, log (J2 / J1), log k, d, b1, b2, kg (SI). For m points, shape
+    (7, m, 1), the responses have the shape (m, n).
     """
     s = 2j * np.pi * frequency
     first, ratio, spring = np.exp(np.clip(point[:3], -100.0, 100.0))
@@ -40,7 +40,7 @@ def model(frequency: Array, point: Array, side: Side, delay: float) -> ComplexAr
 def model_jacobian(
     frequency: Array, point: Array, sides: tuple[Side, ...], side: Side
 ) -> ComplexArray:
-    """Derivative of `model` by all parameters, (n, p); delays of `sides` follow 7 others."""
+    """Derivative of `model` by all parameters, (n, p); delays of `sides` are after the 7 others."""
     s = 2j * np.pi * np.asarray(frequency, dtype=float)
     first, ratio, spring = np.exp(np.clip(point[:3], -100.0, 100.0))
     coupling = spring / s + point[3]
@@ -50,20 +50,20 @@ def model_jacobian(
     value = over / under * np.exp(-s * float(point[7 + sides.index(side)]))
     of_motor, of_load, of_coupling = load + coupling, motor + coupling, motor + load
     first_s, second_s, spring_s = first * s, first * ratio * s, spring / s
-    found = np.zeros((len(s), 7 + len(sides)), dtype=complex)
+    slopes = np.zeros((len(s), 7 + len(sides)), dtype=complex)
     for column, below, above in (
         (0, first_s * of_motor + second_s * of_load, second_s),
         (1, second_s * of_load, second_s),
         (5, of_load, 1.0),
     ):
         raised = above / over if side == "motor" else 0.0
-        found[:, column] = value * (raised - below / under)
-    found[:, 2] = value * (spring_s / over - spring_s * of_coupling / under)
-    found[:, 3] = value * (1.0 / over - of_coupling / under)
-    found[:, 4] = value * (-of_motor / under)
-    found[:, 6] = value * (-(1.0 / s * of_motor) / under)
-    found[:, 7 + sides.index(side)] = -s * value
-    return found
+        slopes[:, column] = value * (raised - below / under)
+    slopes[:, 2] = value * (spring_s / over - spring_s * of_coupling / under)
+    slopes[:, 3] = value * (1.0 / over - of_coupling / under)
+    slopes[:, 4] = value * (-of_motor / under)
+    slopes[:, 6] = value * (-(1.0 / s * of_motor) / under)
+    slopes[:, 7 + sides.index(side)] = -s * value
+    return slopes
 
 
 def polynomials(point: Array, side: Side) -> tuple[Array, Array]:
@@ -80,10 +80,10 @@ def polynomials(point: Array, side: Side) -> tuple[Array, Array]:
 
 
 def sizes(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -> Array:
-    """What a step of each parameter is measured in.
+    """Scale of each parameter.
 
-    1 for logarithms, damping and stiffness of the whole inertia at the middle frequency, a tenth of
-    its period for delays.
+    1 for logarithms; for damping and stiffness from the whole inertia at the middle frequency w, a
+    tenth of J w and J w²; for delays 0.1 / w.
     """
     measured = responses[sides[0]]
     middle = 2.0 * np.pi * float(np.sqrt(measured.frequency[0] * measured.frequency[-1]))
@@ -94,7 +94,7 @@ def sizes(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -
 
 
 def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -> list[Array]:
-    """The best of a grid of resonances, antiresonances and dampings, by the logarithm of gain."""
+    """Best points of a grid of resonances, antiresonances and dampings, by the log of gain."""
     frequency = np.concatenate([responses[side].frequency for side in sides])
     candidates = np.geomspace(frequency.min() * 1.05, frequency.max() * 1.2, 48)
     ratio, damping = np.meshgrid(RATIOS, DAMPINGS, indexing="ij")
@@ -112,7 +112,7 @@ def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) 
             for side in sides
         ]
         off = np.log(np.concatenate(over, axis=1))
-        scale = np.median(off, axis=1)  # the model's gain falls with the inertia
+        scale = np.median(off, axis=1)  # the model's gain is proportional to 1 / inertia
         some[[0, 2]] += scale
         some[3] *= np.exp(scale)
         points.append(some.T)
@@ -129,7 +129,7 @@ def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) 
 
 
 def mode_damping(point: Array) -> float:
-    """Damping ratio of the resonance: of the poles of `model` with the largest frequency."""
+    """Damping ratio of the resonance: the poles of `model` with the largest frequency."""
     roots = np.polynomial.polynomial.polyroots(polynomials(point, "motor")[1])
     pairs = roots[np.abs(roots.imag) > 0]
     if not len(pairs):

@@ -1,10 +1,9 @@
 """Responses from averaged spectra: H1, H2, Hv, or with a loop's reference.
 
-What is excited must be said, because no recording shows it: a response read as output over input
-of a loop that is closed, without a signal from outside, is anything between that of the plant and
-the negative inverse of the controller's (Bendat and Piersol, "Random Data" (2010), 9.3; Ljung,
-"System Identification" (1999), 13.4). With such a signal r it is S_yr / S_ur, whatever closes the
-loop.
+The caller must state the excited signal, because no recording shows it. In a closed loop without an
+external signal, output over input lies between the response of the plant and the negative inverse
+of that of the controller (Bendat and Piersol, "Random Data" (2010), 9.3; Ljung, "System
+Identification" (1999), 13.4). With an external signal r it is S_yr / S_ur for any controller.
 """
 
 from __future__ import annotations
@@ -21,22 +20,22 @@ from campaign.estimation.frequency.measured_response import MeasuredResponse
 Estimator = Literal["H1", "H2", "Hv"]
 Excited = Literal["input", "reference"]
 SEGMENTS = 16
-"""lengths of a segment that a recording has, unless told otherwise."""
+"""Default number of segment lengths in all recordings."""
 FEWEST_AVERAGES = 4.0
-"""Effective averages below which spectra say nothing about their own scatter."""
+"""Effective averages below which spectra do not determine their own scatter."""
 WINDOW, OVERLAP = "hann", 0.5
-"""of the segments: its name in `scipy.signal`, and what of a segment the next one shares."""
+"""Window of the segments by its name in `scipy.signal`; share of a segment in the next one."""
 FIRST_LINE = 2
-"""Lines below are those of the mean and what a window makes of it."""
+"""First line used: the lines below contain the mean, spread by the window."""
 STRONG = 10.0
-"""First-stage F above which a reference counts as moving the input at a line (Staiger, Stock)."""
+"""First-stage F above which a reference excites the input at a line (Staiger, Stock)."""
 
 
 @dataclass(frozen=True)
 class Record:
     """One recording: evenly sampled at `rate` (Hz), signals of shape (n,).
 
-    `reference`: what comes into a loop from outside (a command, an added torque).
+    `reference`: external signal of a loop (a command, an added torque).
     """
 
     rate: float
@@ -52,7 +51,7 @@ class Spectra:
     Attributes:
         cross: S_yu, output times the conjugate of the input.
         of_reference: S_rr, S_yr and S_ur where there is a reference.
-        averages: independent segments that the overlapping ones are worth.
+        averages: effective number of independent segments.
     """
 
     frequency: Array
@@ -75,10 +74,10 @@ def _coherence(cross: ComplexArray, one: Array, other: Array) -> Array:
 
 
 def spectra(records: Sequence[Record], segment: int | None = None) -> Spectra:
-    """Averaged over the segments of all records (Welch, IEEE Trans. AU-15 (1967) 70).
+    """Spectra averaged over the segments of all records (Welch, IEEE Trans. AU-15 (1967) 70).
 
-    segment: its length in samples: the resolution is rate / segment. Absent: a 16th of them all, as
-        far as the shortest record has it.
+    segment: length in samples; the resolution is rate / segment. Default: a 16th of all samples, at
+        most the shortest record.
 
     Raises ValueError for records of different rates, or too short for enough averages.
     """
@@ -138,7 +137,7 @@ def _segments(record: Record, shape: Array, step: int, with_reference: bool) -> 
 
 
 def _worth(shape: Array, step: int, counts: Sequence[int]) -> float:
-    """Independent segments that overlapping ones are worth (Welch 1967, for white signals)."""
+    """Effective number of independent segments of overlapping ones (Welch 1967, white signals)."""
     total = 0.0
     power = float(np.sum(shape**2))
     for count in counts:
@@ -159,13 +158,13 @@ def welch_response(
     """Output over input, with scatter from coherence and averages, bias from half the segment.
 
     Args:
-        excited: `input`: what the input is was decided outside, nothing feeds back; `reference`:
-            the input is made by a loop, and `Record.reference` is what comes into it from outside.
+        excited: `input`: the input is set from outside, without feedback; `reference`: a loop
+            generates the input, and `Record.reference` is the external signal of the loop.
         estimator: for an excited input: H1 = S_yu / S_uu (noise on the output only), H2 = S_yy /
-            S_uy (on the input only), Hv, their geometric mean (on both alike). With a reference it
-            is S_yr / S_ur, whatever is named.
+            S_uy (on the input only), Hv, their geometric mean (on both). With a reference it is
+            always S_yr / S_ur.
 
-    Lines that the reference does not move (first-stage F below 10) are left out.
+    Lines that the reference does not excite (first-stage F below 10) are omitted.
     Raises ValueError for a loop without its reference, and as `spectra` does.
     """
     if excited == "reference" and any(record.reference is None for record in records):
@@ -175,16 +174,16 @@ def welch_response(
         )
     whole = spectra(records, segment)
     length = segment or _length(whole, records[0].rate)
-    found = _of_spectra(whole, excited, estimator)
+    response = _of_spectra(whole, excited, estimator)
     if length // 2 >= 8:
         half = _of_spectra(spectra(records, length // 2), excited, estimator)
-        found = _with_bias(found, half)
+        response = _with_bias(response, half)
     if excited == "input" or whole.of_reference is None:
-        return found
+        return response
     _, _, of_input = whole.of_reference
     alike = _coherence(of_input, whole.of_reference[0], whole.input_)
     strength = (whole.averages - 1.0) * alike / np.maximum(1.0 - alike, 1e-300)
-    return found.at(strength > STRONG)
+    return response.at(strength > STRONG)
 
 
 def _length(whole: Spectra, rate: float) -> int:
@@ -209,7 +208,7 @@ def _of_spectra(whole: Spectra, excited: Excited, estimator: Estimator) -> Measu
     else:
         rr, yr, ur = whole.of_reference
         values = yr / np.where(np.abs(ur) > 0, ur, tiny)
-        # What the response leaves of the output, none of which the reference has made.
+        # Residual of the output: no part of it is caused by the reference.
         left = yy - 2.0 * np.real(np.conj(values) * yu) + np.abs(values) ** 2 * uu
         left = np.maximum(left, 0.0) * n / (n - 1.0)
         variance = left * rr / np.maximum(np.abs(ur) ** 2, tiny) / n
@@ -224,16 +223,16 @@ def _of_spectra(whole: Spectra, excited: Excited, estimator: Estimator) -> Measu
 
 
 def _with_bias(found: MeasuredResponse, half: MeasuredResponse) -> MeasuredResponse:
-    """With the error that the length of the segments makes.
+    """Add the bias by the length of the segments.
 
-    It falls with the square of the length (Hann), so that it is a third of what half the length
-    changes. What scatter adds to that change is taken off in the mean over five lines.
+    It decreases with the square of the length (Hann): it is a third of the change by half the
+    length. The part of scatter in that change is subtracted, and the mean over five lines taken.
     """
-    there = np.interp(found.frequency, half.frequency, half.values.real) + 1j * np.interp(
+    coarse = np.interp(found.frequency, half.frequency, half.values.real) + 1j * np.interp(
         found.frequency, half.frequency, half.values.imag
     )
-    change = np.abs(there - found.values) ** 2
-    # A line of half the length has half the variance, most of which both lengths share.
+    change = np.abs(coarse - found.values) ** 2
+    # A line of half the length has half the variance, most of which both lengths have in common.
     chance = np.interp(found.frequency, half.frequency, half.variance)
     kernel = np.full(5, 0.2)
     smooth = np.convolve(np.pad(change - chance, 2, mode="edge"), kernel, "valid")

@@ -25,24 +25,24 @@ TOO_FEW_ROWS = Cause("too few independent rows", "the residuals have too few ind
 def estimates(
     fit: Regression, terms: Sequence[Term], parts: Mapping[str, Array | None]
 ) -> dict[str, Estimate]:
-    """Of a regression, by the names of its terms: scatter with autocorrelation.
+    """Estimates of the coefficients, by the names of the terms: scatter with autocorrelation.
 
-    parts: sources of systematic parts, and how far each shifts the coefficients, shape (k,); None
-        where that is not known.
+    parts: sources of systematic parts, with the shift of the coefficients by each, shape (k,);
+        None: unknown.
     """
-    found = {}
+    coefficients = {}
     for index, term in enumerate(terms):
         value, error = float(fit.values[index]), float(fit.robust[index])
         if fit.freedom < 1.0 or not math.isfinite(fit.quantile * error):
-            found[term.name] = Estimate.without_interval(
+            coefficients[term.name] = Estimate.without_interval(
                 term.name, value, term.unit, TOO_FEW_ROWS()
             )
             continue
         one = with_error(term.name, value, term.unit, error, fit.freedom, METHOD, fit.quantile)
         for source, far in parts.items():
             one = shifted_by(one, source, None if far is None else float(far[index]))
-        found[term.name] = one
-    return found
+        coefficients[term.name] = one
+    return coefficients
 
 
 def shifts(
@@ -52,10 +52,9 @@ def shifts(
     filterings: Sequence[FilterSettings],
     delay: float = 0.0,
 ) -> Array | None:
-    """How far coefficients go at most with rows made otherwise, shape (k,); None where these tell
-    none.
+    """Largest shift of each coefficient with other filters, shape (k,); None if none has a fit.
 
-    delay: by which the force is late in these rows (s).
+    delay: of the force in these rows (s).
     """
 
     def other(filtering: FilterSettings) -> Array:
@@ -65,9 +64,9 @@ def shifts(
 
 
 def farthest(values: Array, others: Iterable[Callable[[], Array]]) -> Array | None:
-    """How far other values of shape (k,) go at most; None without any. ValueError makes none."""
-    found = []
+    """Largest distance of other values, shape (k,); None without any. ValueError is skipped."""
+    distances = []
     for other in others:
         with suppress(ValueError):
-            found.append(np.abs(other() - values))
-    return np.max(found, axis=0) if found else None
+            distances.append(np.abs(other() - values))
+    return np.max(distances, axis=0) if distances else None

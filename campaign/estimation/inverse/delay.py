@@ -1,7 +1,7 @@
 """Delay between recorded drive signal and motion.
 
-A command that is held for a sample acts half a sample late; a bus or a filter adds to it. Times the
-inertia it looks like a term of the jerk, and all that share its shape are wrong by it.
+A command with a zero-order hold acts half a sample late; a bus or a filter adds to the delay. The
+delay times the inertia acts as a term of the jerk, and biases all terms that are similar to it.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from campaign.estimation.inverse.terms import Terms
 from campaign.reason import Cause
 
 LONGEST = 0.02
-"""s; delays are looked for up to this, or up to `SAMPLES` samples where these are longer."""
+"""Largest delay of the search (s), unless `SAMPLES` samples are longer."""
 SAMPLES = 5.0
-"""Fewest samples up to which delays are looked for."""
+"""Least range of the search in samples."""
 OWN = 0.05
-"""Share of what a delay changes that has to be like no other term."""
+"""Least share of the effect of a delay that is independent of the other terms."""
 METHOD = "least residual over a shift of the force, Bartlett HAC"
 HALF_BAND_OPEN = Cause("half band open", "half the band does not determine it: {why}")
 STILL_FALLING = Cause(
@@ -41,23 +41,23 @@ STEADY_FORCE = Cause(
 
 
 def find_delay(motions: Sequence[Motion], terms: Terms, filtering: FilterSettings) -> Estimate:
-    """How much later the force acts than it is recorded (s); negative where it is recorded late.
+    """Delay of the force after its record (s); negative if it is recorded late.
 
-    What half the band finds otherwise is a systematic part: a loop that answers the noise of what
-    it measures looks like a delay, the more so the wider the band. All motions have one sample
-    rate. Not determined where the least residual lies at the end of what was looked at.
+    The difference to the result with half the band is a systematic part: the response of a loop to
+    sensor noise looks like a delay, more so with a wider band. All motions have one sample rate.
+    Not determined where the minimum of the residual lies at an end of the search.
     """
-    found = _in_band(motions, terms, filtering)
-    if math.isnan(found.value):
-        return found
+    delay = _in_band(motions, terms, filtering)
+    if math.isnan(delay.value):
+        return delay
     try:
         other = _in_band(motions, terms, filtering.half_band)
     except ValueError:
-        return found
+        return delay
     if math.isnan(other.value):
         reason = HALF_BAND_OPEN(why=other.reason)
         return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
-    return shifted_by(found, "band", abs(other.value - found.value))
+    return shifted_by(delay, "band", abs(other.value - delay.value))
 
 
 def _in_band(motions: Sequence[Motion], terms: Terms, filtering: FilterSettings) -> Estimate:
@@ -81,14 +81,14 @@ def _in_band(motions: Sequence[Motion], terms: Terms, filtering: FilterSettings)
         reason = STILL_FALLING(milliseconds=tried[best] * 1e3)
         return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
     ends = (float(tried[best - 1]), float(tried[best + 1]))
-    found = float(minimize_scalar(left, bounds=ends, method="bounded").x)
-    return _with_interval(found, motions, terms, filtering, reach)
+    least = float(minimize_scalar(left, bounds=ends, method="bounded").x)
+    return _with_interval(least, motions, terms, filtering, reach)
 
 
 def _with_interval(
     delay: float, motions: Sequence[Motion], terms: Terms, filtering: FilterSettings, reach: float
 ) -> Estimate:
-    """By a column more: how the model's own force changes in time."""
+    """Interval from an additional column: the time derivative of the model's force."""
     values = regress([rows(motion, terms, filtering, delay) for motion in motions]).values
     wider = []
     for motion in motions:
@@ -109,9 +109,9 @@ def _with_interval(
 
 
 def _own_share(design: Array) -> float:
-    """Of the last column, of shape (n, k), what the others do not explain: its norm over its own.
+    """Share of the norm of the last column of (n, k) that the others do not explain.
 
-    A single sine in one direction has no time: inertia and viscous friction turn it as a delay.
+    A single sine does not determine a delay: inertia and viscous friction also shift its phase.
     """
     others, last = design[:, :-1], design[:, -1]
     rest = last - others @ np.linalg.lstsq(others, last, rcond=None)[0]

@@ -1,9 +1,9 @@
 """Instrumental variables from the commanded motion.
 
-A measured rate has noise in it, and within a loop the force answers that noise: least squares is
-biased by both. What the loop was asked for knows of neither. Source: Janot, Vandanjon, Gautier,
-IEEE Trans. Control Syst. Technol. 22 (2014); the strength of instruments after Sanderson and
-Windmeijer, J. Econometrics 190 (2016).
+A measured rate contains noise, and in a loop the force responds to that noise: both cause a bias of
+least squares. The commanded motion is independent of the noise. Source: Janot, Vandanjon, Gautier,
+IEEE Trans. Control Syst. Technol. 22 (2014); strength of instruments: Sanderson and Windmeijer,
+J. Econometrics 190 (2016).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class InstrumentFit:
     """A regression by instruments.
 
     Attributes:
-        strength: conditional F of the first stage, shape (k,), with as many rows as are worth it.
+        strength: conditional F of the first stage, shape (k,), with the effective number of rows.
     """
 
     fit: Regression
@@ -41,7 +41,7 @@ class InstrumentFit:
 def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> InstrumentFit:
     """Coefficients from the same columns of another motion, row by row.
 
-    Raises ValueError where instruments say nothing of a column.
+    Raises ValueError where the instruments do not determine the coefficients.
     """
     design, force = stacked(pieces)
     other, _ = stacked(instruments)
@@ -64,15 +64,15 @@ def _strength(design: Array, other: Array, pieces: Sequence[Piece]) -> Array:
     def explained(values: Array) -> Array:
         return np.asarray(basis @ (basis.T @ values))
 
-    found = []
+    strengths = []
     for index in range(design.shape[1]):
         rest = np.delete(design, index, axis=1)
         own = design[:, index]
         if rest.shape[1]:
             own = own - rest @ np.linalg.lstsq(explained(rest), own, rcond=None)[0]
-        told = explained(own)
-        left = own - told
+        seen = explained(own)
+        left = own - seen
         count = effective_count(np.split(left, cuts))
         noise = max(float(left @ left), float(np.finfo(float).tiny))
-        found.append(float(told @ told) / noise * max(count - other.shape[1], 1.0))
-    return np.array(found)
+        strengths.append(float(seen @ seen) / noise * max(count - other.shape[1], 1.0))
+    return np.array(strengths)

@@ -1,7 +1,7 @@
 """A motion prepared for regression: zero-phase filter, derivatives, decimation.
 
-What is measured is a position (or a rate); a regression needs rate and acceleration, and both sides
-of it filtered alike. Source: Janot, Vandanjon, Gautier, "A generic instrumental variable approach
+A recording contains a position (or a rate); a regression needs rate and acceleration, with the same
+filter on both sides. Source: Janot, Vandanjon, Gautier, "A generic instrumental variable approach
 for industrial robot identification", IEEE Trans. Control Syst. Technol. 22 (2014), section II.
 """
 
@@ -17,29 +17,29 @@ import numpy as np
 from campaign.arrays import Array, Flags
 
 ORDER = 4
-"""of the Butterworth low-pass, which runs forward and backward."""
+"""Order of the Butterworth low-pass, which runs forward and backward."""
 DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND = 8, 0.05, 0.8
 """Chebyshev low-pass of the decimation: order, ripple (dB), share of the new Nyquist frequency."""
 LOW_PASS, LOW_PASS_SHARE = 100.0, 0.2
-"""Hz, and share of the sample rate: the smaller is the corner, where nobody says another."""
+"""Default corner: the smaller of a frequency (Hz) and a share of the sample rate."""
 REGRESSION_RATE = 100.0
-"""Hz; samples are decimated to about this where nobody says how far."""
+"""Default rate after decimation (Hz), approximately."""
 FASTER = (2.0, 5.0)
-"""times the slowest rate, below which rows are left out to see what sliding that sets in does."""
+"""Multiples of the slowest rate, below which rows are omitted to see the effect of slow sliding."""
 SHORTEST = 8
-"""Decimated samples that a piece of a motion must have to be used."""
+"""Fewest decimated samples of a usable piece of a motion."""
 
 
 @dataclass(frozen=True)
 class FilterSettings:
-    """How a motion is made ready.
+    """Settings of filter and decimation of a motion.
 
     Attributes:
         low_pass: corner of the position's (or the rate's) zero-phase low-pass (Hz).
-        decimation: of how many samples one is kept, behind a low-pass of its own; 1 for all.
-        skip: samples at the beginning that are left out, after differentiation.
-        slowest: rate (rad/s, or m/s) below which rows count as standing still and are left out,
-            with one beside them: there friction is whatever holds the axis.
+        decimation: factor of the decimation, which has its own low-pass; 1: none.
+        skip: samples omitted at the beginning, after differentiation.
+        slowest: rate (rad/s, or m/s) below which rows count as standstill and are omitted with
+            their neighbors, because friction at standstill is equal to the force.
     """
 
     low_pass: float
@@ -49,31 +49,31 @@ class FilterSettings:
 
     @classmethod
     def for_rate(cls, sample_rate: float) -> Self:
-        """What is taken where nobody says anything, for samples at this rate (Hz)."""
+        """Default settings for a sample rate (Hz)."""
         corner = min(LOW_PASS, LOW_PASS_SHARE * sample_rate)
         return cls(corner, max(1, round(sample_rate / REGRESSION_RATE)))
 
     @property
     def half_band(self) -> Self:
-        """With half of the band that rows have: noise is less, and so is what bends."""
+        """Settings with half the bandwidth of rows: less noise."""
         return replace(self, decimation=2 * self.decimation)
 
     @property
     def faster(self) -> tuple[Self, ...]:
-        """Without rows up to higher rates: what happens as sliding sets in counts for less."""
+        """Settings that omit rows up to higher rates, to reduce the effect of slow sliding."""
         return tuple(replace(self, slowest=times * self.slowest) for times in FASTER)
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """An evenly sampled motion and what drove it, before decimation; arrays of shape (n,).
+    """An evenly sampled motion with its force, before decimation; arrays of shape (n,).
 
     Attributes:
         time: s.
         position: rad, or m of a linear axis.
-        rate, acceleration: its derivatives, without phase.
-        force: what drives the axis (N m, or N), as recorded.
-        temperature: K; None where nobody recorded it.
+        rate, acceleration: its derivatives, without phase shift.
+        force: drive force or torque (N m, or N), as recorded.
+        temperature: degC; None: not recorded.
     """
 
     time: Array
@@ -85,11 +85,11 @@ class Motion:
 
     @property
     def sample_rate(self) -> float:
-        """Hz."""
+        """Sample rate (Hz)."""
         return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
 
     def part(self, which: slice) -> Motion:
-        """Samples of it that follow each other."""
+        """Consecutive samples of the motion."""
         own = {name: values for name, values in vars(self).items() if values is not None}
         return Motion(**{name: values[which] for name, values in own.items()})
 
@@ -97,7 +97,7 @@ class Motion:
 def motion_of_position(
     time: Array, position: Array, force: Array, low_pass: float, temperature: Array | None = None
 ) -> Motion:
-    """From a measured position, shape (n,): low-passed once, differentiated twice."""
+    """Motion from a measured position, shape (n,): low-passed once, differentiated twice."""
     rate = sample_rate_of(time)
     smooth = zero_phase(position, low_pass, rate)
     first = np.gradient(smooth, 1.0 / rate)
@@ -107,7 +107,7 @@ def motion_of_position(
 def motion_of_rate(
     time: Array, rate: Array, force: Array, low_pass: float, temperature: Array | None = None
 ) -> Motion:
-    """From a measured rate, shape (n,); the position begins at zero, and drifts with its bias."""
+    """Motion from a measured rate, shape (n,); the position begins at 0 and drifts by its bias."""
     per_second = sample_rate_of(time)
     smooth = zero_phase(rate, low_pass, per_second)
     steps = 0.5 * (smooth[1:] + smooth[:-1]) / per_second
@@ -116,15 +116,14 @@ def motion_of_rate(
 
 
 def sample_rate_of(time: Array) -> float:
-    """Hz, of even times (s), shape (n,)."""
+    """Sample rate (Hz) of evenly spaced times (s), shape (n,)."""
     return float((len(time) - 1) / (time[-1] - time[0]))
 
 
 def zero_phase(samples: Array, low_pass: float, sample_rate: float) -> Array:
-    """Butterworth low-pass, forward and backward, shape (n,); as it is where the corner is beyond
-    what can be sampled.
+    """Butterworth low-pass, forward and backward, shape (n,).
 
-    Raises ValueError for fewer samples than the filter needs to begin with.
+    No filter for a corner at or above half the sample rate. Raises ValueError for too few samples.
     """
     from scipy.signal import butter, filtfilt
 
@@ -136,17 +135,17 @@ def zero_phase(samples: Array, low_pass: float, sample_rate: float) -> Array:
 
 
 def decimated(columns: Array, factor: int) -> Array:
-    """Every `factor`-th row of `columns`, shape (n, k), behind a zero-phase Chebyshev low-pass.
+    """Every `factor`-th row of `columns`, shape (n, k), after a zero-phase Chebyshev low-pass.
 
-    The phase is that of MATLAB's `decimate`: the last sample is always among those kept. Both sides
-    of a regression pass the same filter, so that it weights them alike. What is constant passes as
-    it is: a filter of even order would take its ripple from it.
+    As in MATLAB's `decimate`, the last sample is always kept. Both sides of a regression have the
+    same filter, and so the same weights. The gain is scaled to 1 at zero frequency, where a filter
+    of even order has its ripple.
     """
     return _smooth(columns, factor)[first_kept(len(columns), factor) :: factor]
 
 
 def _smooth(columns: Array, factor: int) -> Array:
-    """`columns`, shape (n, k), behind the low-pass of a decimation by `factor`."""
+    """`columns`, shape (n, k), after the low-pass of a decimation by `factor`."""
     from scipy.signal import sosfiltfilt
 
     if factor == 1:
@@ -163,7 +162,7 @@ def first_kept(count: int, factor: int) -> int:
 
 
 def kept_times(motion: Motion, filtering: FilterSettings) -> Array:
-    """Times (s) of the rows that are left of a motion."""
+    """Times (s) of the decimated rows of a motion."""
     time = motion.time[filtering.skip :]
     if filtering.decimation == 1:
         return time
@@ -171,7 +170,7 @@ def kept_times(motion: Motion, filtering: FilterSettings) -> Array:
 
 
 def later(samples: Array, delay: float, sample_rate: float) -> Array:
-    """What a signal of shape (n,) is `delay` (s) later, by cubic interpolation; ends are held."""
+    """Signal of shape (n,) with a `delay` (s), by cubic interpolation; constant beyond the ends."""
     from scipy.interpolate import CubicSpline
 
     if delay == 0.0:
@@ -183,10 +182,10 @@ def later(samples: Array, delay: float, sample_rate: float) -> Array:
 
 @lru_cache(maxsize=16)
 def _decimator(factor: int) -> Array:
-    """The low-pass in sections of second order, shape (n, 6).
+    """Low-pass in sections of second order, shape (n, 6).
 
-    One polynomial is not exact where the factor is large. Kept: making it takes longer than to
-    filter a short motion.
+    One polynomial is inaccurate for a large factor. Cached: its design takes longer than to filter
+    a short motion.
     """
     from scipy.signal import cheby1
 
@@ -195,10 +194,10 @@ def _decimator(factor: int) -> Array:
 
 
 class LateRows:
-    """Decimated rows of a signal, for one delay after the other.
+    """Decimated rows of a signal for many delays.
 
-    A delay and a low-pass may be exchanged: the signal is filtered once, and each delay asks for
-    the rows alone. The ends differ from those of `decimated(later(...))` by what is held there.
+    Delay and low-pass commute: the signal is filtered once, and a delay needs only an
+    interpolation. At the ends the rows differ from `decimated(later(...))`.
     """
 
     def __init__(self, samples: Array, sample_rate: float, filtering: FilterSettings) -> None:
@@ -214,13 +213,13 @@ class LateRows:
         self._last = place[-1]
 
     def at(self, delay: float) -> Array:
-        """The rows of a signal that is `delay` (s) later, shape (rows,)."""
+        """Rows of the signal with a `delay` (s), shape (rows,)."""
         wanted = np.clip(self._kept - delay * self._rate, 0.0, self._last)
         return np.asarray(self._between(wanted))
 
 
 def whole_pieces(good: Flags, fewest: int) -> Sequence[slice]:
-    """Runs of at least `fewest` samples that are all there; good: shape (n,)."""
+    """Runs of at least `fewest` valid samples; good: mask, shape (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     runs = edges.reshape(-1, 2)
     return [slice(int(a), int(b)) for a, b in runs if b - a >= fewest]

@@ -7,31 +7,31 @@ import numpy as np
 from campaign.arrays import Array
 
 FEWEST, MOST = 1.0, 400.0
-"""Periods in the travel between which one is looked for."""
+"""Range of the search: number of periods in the travel."""
 FINE = 8
-"""Tried periods per period in the travel: two neighbours shift by an eighth over all of it."""
+"""Tried periods per period in the travel: neighbors differ by an eighth of a period over it."""
 FEWEST_ROWS = 10.0
-"""Rows in a period, at least, at the rate of a row that counts: a faster one does not show it."""
+"""Fewest rows per period at the rate of a row: faster rows do not resolve the period."""
 SLOW = 0.1
-"""Share of the moving rows, the slowest, that set the shortest period."""
+"""Share of the slowest moving rows that determines the shortest period."""
 CERTAIN = 2.0
-"""Periods in the travel from which on any wave counts: friction that differs at both ends of the
-travel, where the axis turns round, looks like less than that ..."""
+"""Periods in the travel above which any wave counts. Different friction at both ends of the travel,
+where the axis reverses, looks like fewer periods."""
 WIDE = 0.5
-"""... so that a longer wave counts where it explains this share of what it was looked for in."""
+"""Least share of the sum of squares that a longer wave must explain to count."""
 FEWEST_PERIODS = 3.0
-"""of rows that count, at least."""
+"""Least travel of the rows that count, in periods."""
 
 
 def find_period(position: Array, rate: Array, residuals: Array, interval: float) -> float | None:
-    """The period (rad, or m) at which residuals, of shape (n,), repeat most; None for no travel.
+    """Strongest spatial period (rad, or m) of residuals, shape (n,); None without a candidate.
 
-    Force over position and friction over position (with the sign of the rate) count alike. Of each
-    period those rows count that are slow enough to show it, whatever the others do. Whether it is
-    worth a term is for blocks that were left out to say.
+    Waves of force and of friction (with the sign of the rate) have the same weight. For each period
+    only rows that are slow enough to resolve it count. Held-out blocks decide later whether the
+    model gets a term for it.
 
     Args:
-        rate: zero in rows that were left out, whose position says nothing.
+        rate: zero in omitted rows.
         interval: of the rows (s).
     """
     steps = np.abs(rate) * interval
@@ -53,9 +53,9 @@ def find_period(position: Array, rate: Array, residuals: Array, interval: float)
 def _gains(
     periods: Array, travel: float, position: Array, rate: Array, residuals: Array, steps: Array
 ) -> Array:
-    """Rise of the log-likelihood, but for a factor, by waves of each period; 0 for too few rows.
+    """Rise of the log-likelihood, up to a factor, by waves of each period; 0 for too few rows.
 
-    Beyond a spring and friction: a long wave looks like these.
+    In addition to a spring and friction, which are similar to a long wave.
     """
     squares = np.zeros((len(periods), 7, 7))
     rights, (sizes, rows) = np.zeros((len(periods), 7)), np.zeros((2, len(periods)))
@@ -63,27 +63,29 @@ def _gains(
         own = steps * FEWEST_ROWS <= period
         if float(steps[own].sum()) < FEWEST_PERIODS * period:
             continue
-        at, way, values = position[own], np.sign(rate[own]), residuals[own]
+        at, sign, values = position[own], np.sign(rate[own]), residuals[own]
         angle = 2.0 * np.pi * at / period
         columns = np.ones((7, len(at)))
-        columns[1], columns[2] = at, way
+        columns[1], columns[2] = at, sign
         columns[3], columns[4] = np.sin(angle), np.cos(angle)
-        columns[5:] = way * columns[3:5]
+        columns[5:] = sign * columns[3:5]
         squares[k], rights[k] = columns @ columns.T, columns @ values
         sizes[k], rows[k] = values @ values, len(at)
     before = _unexplained(squares[:, :3, :3], rights[:, :3], sizes)
     after = _unexplained(squares, rights, sizes)
-    told = (before > 0) & ~((periods > travel / CERTAIN) & (after > WIDE * before))
+    kept = (before > 0) & ~((periods > travel / CERTAIN) & (after > WIDE * before))
     gains = np.zeros(len(periods))
-    gains[told] = rows[told] * np.log(before[told] / np.maximum(after, 1e-12 * before)[told])
+    gains[kept] = rows[kept] * np.log(before[kept] / np.maximum(after, 1e-12 * before)[kept])
     return gains
 
 
 def _unexplained(squares: Array, rights: Array, sizes: Array) -> Array:
-    """Sums of squares that columns leave of values, shape (m,): of the products of k columns with
-    each other, shape (m, k, k), and with the values, (m, k), and of the values with themselves.
+    """Residual sums of squares, shape (m,), from products.
+
+    Products of k columns with each other, shape (m, k, k), with the values, (m, k), and squares of
+    the values, (m,).
     """
     least = float(np.finfo(float).eps) * squares.shape[-1]
     inverse = np.linalg.pinv(squares, rcond=least, hermitian=True)
-    told = np.einsum("mi,mij,mj->m", rights, inverse, rights)
-    return np.asarray(np.maximum(sizes - told, 0.0))
+    explained = np.einsum("mi,mij,mj->m", rights, inverse, rights)
+    return np.asarray(np.maximum(sizes - explained, 0.0))

@@ -1,9 +1,9 @@
 """Linear regression with autocorrelated residuals over several recordings.
 
-Ordinary deviations of an inverse dynamic model are 4 to 5 times too small: what it leaves over is
-no white noise. The covariance here is that of `long_run`. Quantiles know of the bandwidth (Kiefer
-and Vogelsang, Econom. Theory 21, 2005, Table 1): with a long one plain Student's t holds too
-little.
+Ordinary deviations of an inverse dynamic model are 4 to 5 times too small, because its residuals
+are not white noise. The covariance here is that of `long_run`. Quantiles depend on the bandwidth
+(Kiefer and Vogelsang, Econom. Theory 21, 2005, Table 1): with a long bandwidth the coverage of
+Student's t is too low.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from campaign.estimation.intervals import student
 from campaign.estimation.long_run import bandwidths, long_run, safe_deviations, scaled_to
 
 COLLINEAR = 1e10
-"""Condition number of the scaled columns above which some cannot be told apart."""
+"""Condition number of the scaled columns above which some are dependent."""
 KIEFER = (1.0, 1.51500, 0.21224, -0.27163)
-"""Polynomial in bandwidth over samples by which a normal quantile grows (Bartlett, 97.5 %)."""
+"""Factor of a normal quantile: polynomial in bandwidth over samples (Bartlett, 97.5 %)."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Rows that follow each other evenly: columns (n, k), right side (n,), times (s), (n,)."""
+    """Evenly spaced rows: columns (n, k), right side (n,), times (s), (n,)."""
 
     columns: Array
     force: Array
@@ -55,13 +55,13 @@ class Regression:
         covariance: robust, shape (k, k), scaled so that its diagonal is `robust` squared.
         lags: bandwidth of the rule.
         freedom: effective number of rows less coefficients.
-        effective: how many independent rows the residuals are worth.
-        residuals: of each piece, shape (n,); zero where rows were left out.
-        count: rows that were not.
+        effective: effective number of rows.
+        residuals: of each piece, shape (n,); zero in omitted rows.
+        count: number of rows without omitted ones.
         relative: norm of the residuals over norm of the force.
-        condition: condition number of the columns as they are.
-        likeness: the same of columns of unit length, which units do not change.
-        matters: size of each coefficient below which its force does not matter, shape (k,).
+        condition: condition number of the unscaled columns.
+        likeness: condition number of the columns scaled to unit length, independent of units.
+        matters: size of each coefficient below which its force is negligible, shape (k,).
     """
 
     values: Array
@@ -81,21 +81,21 @@ class Regression:
 
     @property
     def correlation(self) -> Array:
-        """Of the coefficients, shape (k, k)."""
+        """Correlation of the coefficients, shape (k, k)."""
         return np.asarray(self.covariance / np.outer(self.robust, self.robust))
 
     @property
     def quantile(self) -> float:
-        """Half-width of a 95 % interval over its deviation: Student's t, grown by the bandwidth."""
+        """Half-width of a 95 % interval over its deviation: Student's t, adjusted to bandwidth."""
         share = min(1.0, max(each.lags for each in self.by_bandwidth) / self.count)
         grown: float = sum(c * share**i for i, c in enumerate(KIEFER))
         return float(student(max(self.freedom, 1.0)) * grown)
 
 
 def regress(pieces: Sequence[Piece]) -> Regression:
-    """Least squares of the force by the columns, all pieces together.
+    """Least-squares regression of the force on the columns, all pieces together.
 
-    Raises ValueError where there are too few rows, or columns that cannot be told apart.
+    Raises ValueError for too few rows, or dependent columns.
     """
     design, force = stacked(pieces)
     return fitted(pieces, np.asarray(np.linalg.pinv(_checked(design))), design, force)
@@ -110,31 +110,31 @@ def stacked(pieces: Sequence[Piece]) -> tuple[Array, Array]:
 
 
 def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array) -> Regression:
-    """A regression whose coefficients are `inverse` (k, n) times the force (n,).
+    """Regression with the coefficients `inverse` (k, n) times the force (n,).
 
-    Least squares and instruments differ in `inverse` alone.
+    Least squares and instruments differ only in `inverse`.
     """
     k = design.shape[1]
-    n = int(np.count_nonzero(np.any(design != 0.0, axis=1)))  # others were left out
+    n = int(np.count_nonzero(np.any(design != 0.0, axis=1)))  # the others are omitted
     values = inverse @ force
     cuts = np.cumsum([len(piece.force) for piece in pieces])[:-1]
     residuals = tuple(np.split(force - design @ values, cuts))
     whole = np.concatenate(residuals)
     variance = float(whole @ whole) / (n - k)
     ordinary = np.sqrt(variance * np.sum(inverse**2, axis=1))
-    # Each row's share in each coefficient's error; pieces do not know of each other.
+    # Contribution of each row to each coefficient's error; pieces are uncorrelated.
     scores = [s * e[:, None] for s, e in zip(np.split(inverse.T, cuts), residuals, strict=True)]
     scores = [s * math.sqrt(n / (n - k)) for s in scores]
     tried = bandwidths(scores)
     covariances = [long_run(scores, each) for each in tried]
-    found = np.sqrt([np.diag(each) for each in covariances])
-    robust = safe_deviations(found)
+    widths = np.sqrt([np.diag(each) for each in covariances])
+    robust = safe_deviations(widths)
     effective = effective_count(residuals) * n / len(force)
     return Regression(
         values=values,
         ordinary=ordinary,
         robust=robust,
-        by_bandwidth=tuple(Deviations(lag, sd) for lag, sd in zip(tried, found, strict=True)),
+        by_bandwidth=tuple(Deviations(lag, sd) for lag, sd in zip(tried, widths, strict=True)),
         covariance=scaled_to(covariances[1], robust),
         lags=tried[1],
         freedom=effective - k,
@@ -149,7 +149,7 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
 
 
 def effective_count(residuals: Sequence[Array]) -> float:
-    """How many independent values the residuals are worth: pairs of lags until they turn negative.
+    """Effective sample size of the residuals, from pairs of lags up to the first negative pair.
 
     Source: Geyer, Stat. Sci. 7 (1992), initial positive sequence.
     """

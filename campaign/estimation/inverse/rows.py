@@ -1,4 +1,4 @@
-"""Rows of a regression: columns and force, filtered alike and decimated."""
+"""Rows of a regression: columns and force, with the same filter and decimation."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from campaign.estimation.inverse.terms import TERMS, Term, Terms, columns
 T = TypeVar("T")
 
 END_ROWS, END_PERIODS = 5, 3.0
-"""Rows, or periods of the low-pass, that its beginning and its end spoil; a tenth at most."""
+"""Rows, or periods of the low-pass, that are omitted at both ends; at most a tenth."""
 
 
 def rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float = 0.0) -> Piece:
     """Columns (n, k) and force (n,) of a motion, the force `delay` (s) later than recorded.
 
-    Rows that are left out as standing still are zero: the others keep their places in time.
+    Rows at standstill are zero, so that the others keep their places in time.
     """
     piece = all_rows(motion, terms, filtering, delay)
     if filtering.slowest == 0.0:
@@ -40,14 +40,14 @@ def rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float =
 
 
 def all_rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float = 0.0) -> Piece:
-    """The same with those that stand still."""
+    """As `rows`, with those at standstill."""
     made = [_column(motion, term, filtering) for term in terms]
     force = late_force(motion, filtering).at(delay)
     return Piece(np.column_stack(made), force, kept_times(motion, filtering))
 
 
 _MADE: WeakKeyDictionary[Motion, dict[Hashable, Any]] = WeakKeyDictionary()
-"""Filtered columns by motion: dozens of structures share them, and filtering is what takes time."""
+"""Cache of filtered columns by motion: dozens of structures use them, and filtering is slow."""
 
 
 def _once(motion: Motion, key: Hashable, make: Callable[[], T]) -> T:
@@ -66,7 +66,7 @@ def _column(motion: Motion, term: Term, filtering: FilterSettings) -> Array:
 
 
 def late_force(motion: Motion, filtering: FilterSettings) -> LateRows:
-    """The rows of the force, for any delay."""
+    """Rows of the force, for any delay."""
     return _once(
         motion,
         (filtering.decimation, filtering.skip),
@@ -75,9 +75,9 @@ def late_force(motion: Motion, filtering: FilterSettings) -> LateRows:
 
 
 def moving(motion: Motion, filtering: FilterSettings) -> Array:
-    """1 for rows in which the axis moves, and 0 for others, shape (n,).
+    """Mask of the rows in which the axis moves, 1 or 0, shape (n,).
 
-    Those at both ends are among the others: differentiated noise is large there.
+    It is 0 at both ends, where differentiated noise is large.
     """
     rate = _column(motion, TERMS["viscous"], filtering)
     slow = np.abs(rate) < filtering.slowest
@@ -94,7 +94,7 @@ def moving(motion: Motion, filtering: FilterSettings) -> Array:
 
 
 def in_blocks(pieces: Sequence[Piece], count: int) -> list[list[slice]]:
-    """About `count` blocks of rows that follow each other, of nearly equal length, per piece."""
+    """About `count` blocks of consecutive rows in total, of similar length, for each piece."""
     total = sum(len(piece.force) for piece in pieces)
     parts = []
     for piece in pieces:
@@ -110,6 +110,6 @@ def part(piece: Piece, which: slice) -> Piece:
 
 
 def relative(residuals: Sequence[Array], forces: Sequence[Array]) -> float:
-    """Norm of what is left over, over that of the force."""
+    """Norm of the residuals over that of the force."""
     over = sum(float(each @ each) for each in residuals)
     return float(np.sqrt(over / sum(float(each @ each) for each in forces)))

@@ -1,9 +1,9 @@
 """Simulated motion of an inverse model under its recorded force or command.
 
-A small residual of forces may still move wrongly. The axis is released from where it was measured
-to be, again and again, and goes its own way under the recorded force; dry friction holds it where
-the force does not overcome it. Where it is known what motion was wanted, a loop follows that, and
-nothing that was measured is in the simulated motion but the model's few numbers.
+A model with a small force residual may still have a large error of motion. The simulation starts
+again and again from the measured state and continues under the recorded force; dry friction holds
+the axis where the force does not overcome it. If the commanded motion is known, the simulation is a
+closed loop that follows it. Then it depends on measured data only through the model's parameters.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from campaign.estimation.inverse.motion import Motion, later, zero_phase
 from campaign.estimation.inverse.terms import Terms
 
 STRETCH = 1.0
-"""s that the axis goes its own way."""
+"""Length of a simulated stretch (s)."""
 LEAD = 1.0
-"""s before each stretch in which a loop forgets where it was released."""
+"""Time before each stretch in which a loop settles from its initial state (s)."""
 STEPS = 4.0
-"""Steps at least within the fastest time of a loop."""
+"""Fewest steps in the shortest time constant of a loop."""
 MOST_STEPS = 50
-"""within a sample: a loop that is faster is none of this axis."""
+"""Most steps in a sample: a loop that needs more is implausibly fast for this axis."""
 FOLLOWS = 0.5
-"""of the force's variance: below that it does not follow from what was wanted."""
+"""Least share of the force's variance that the commanded motion explains."""
 
 Drive = Callable[[int, Array, Array], Array]
 
 
 @dataclass(frozen=True)
 class Loop:
-    """What a loop makes of what is wanted and of what is.
+    """Control law of a loop: force from the commanded and the actual motion.
 
     Attributes:
         stiffness, damping: force over error of position, and of rate.
-        ahead: the rest of the force, decided by the wanted motion alone, shape (n,).
-        explained: share of the force's variance that all of it makes up.
+        ahead: the rest of the force, which depends on the commanded motion alone, shape (n,).
+        explained: share of the force's variance that the law explains.
     """
 
     stiffness: float
@@ -50,11 +50,11 @@ class Loop:
 
 
 def find_loop(motion: Motion, wanted: Motion, low_pass: float) -> Loop:
-    """The loop that made the force of a wanted motion, by least squares.
+    """Control law from force, motion and commanded motion, by least squares.
 
-    The force passes the same low-pass (Hz) as the motions did. Integral action goes with what it
-    works against: place, rate and direction that were wanted. Raises ValueError where the
-    force does not follow from the errors.
+    The force has the same low-pass (Hz) as the motions. Terms of commanded position, rate and
+    direction represent integral action. Raises ValueError where the errors do not explain the
+    force.
     """
     error, slower = wanted.position - motion.position, wanted.rate - motion.rate
     own = (error, slower, np.ones_like(error), wanted.position, wanted.rate, wanted.acceleration,
@@ -73,11 +73,10 @@ def find_loop(motion: Motion, wanted: Motion, low_pass: float) -> Loop:
 
 
 def driven_motion(motion: Motion, terms: Terms, values: Array, delay: float = 0.0) -> Motion:
-    """Whole stretches of a motion as the model makes them of the recorded force.
+    """Simulated motion of whole stretches under the recorded force.
 
-    values: of the terms, the first of which is the inertia. Semi-implicit Euler at the sample rate:
-    good to the step, as the force is held over it. Raises ValueError without a positive inertia or
-    a whole stretch.
+    values: of the terms, the first of which is the inertia. One integration step per sample, over
+    which the force is constant. Raises ValueError without a positive inertia or a whole stretch.
     """
     count, steps = _stretches(motion)
     force = later(motion.force, delay, motion.sample_rate)[: count * steps].reshape(count, steps)
@@ -93,9 +92,9 @@ def driven_motion(motion: Motion, terms: Terms, values: Array, delay: float = 0.
 def followed_motion(
     motion: Motion, wanted: Motion, loop: Loop, terms: Terms, values: Array
 ) -> Motion:
-    """Whole stretches of a motion as the model makes them within a loop, of what was wanted alone.
+    """Simulated motion of whole stretches in a closed loop, from the commanded motion alone.
 
-    Raises ValueError as `driven_motion` does.
+    Raises ValueError as `driven_motion` does, and for a loop that is too fast.
     """
     count, steps = _stretches(motion)
     lead = round(LEAD * motion.sample_rate)
@@ -130,7 +129,7 @@ def _heat(motion: Motion, where: NDArray[np.int64]) -> Array | None:
 
 
 def _joined(motion: Motion, made: tuple[Array, Array, Array], lead: int) -> Motion:
-    """Stretches one after the other, without what led to each."""
+    """Consecutive stretches as one motion, without their lead times."""
     place, rate, change = (each[:, lead:].ravel() for each in made)
     count = len(place)
     warm = None if motion.temperature is None else motion.temperature[:count]
@@ -147,7 +146,7 @@ def _going(
     warm: Array | None,
     drive: Drive,
 ) -> tuple[Array, Array, Array]:
-    """Position, rate and acceleration of stretches beside each other, each (count, steps)."""
+    """Position, rate and acceleration of parallel stretches, each (count, steps)."""
     if terms[0].name != "inertia" or not values[0] > 0:
         raise ValueError("without a positive inertia nothing can be simulated")
     step = 1.0 / (motion.sample_rate * fine)
@@ -158,7 +157,7 @@ def _going(
     still, asked = np.zeros(len(q)), np.empty((len(q), len(terms) - 1))
 
     def resisting(place: Array, at: Array, heat: Array | None) -> Array:
-        """What the model's other terms ask for at a place and a rate, (count,)."""
+        """Force of the model's other terms at a position and a rate, (count,)."""
         if len(terms) == 1:
             return still
         here = Motion(at, place, at, still, at, heat)
@@ -173,7 +172,7 @@ def _going(
             force = drive(k, q, v)
             held = np.abs(v) <= tiny
             going = v
-            if held.any():  # what holds an axis is asked for in both directions
+            if held.any():  # holding friction acts in both directions
                 forward = resisting(q, np.full_like(v, tiny), heat)
                 backward = resisting(q, np.full_like(v, -tiny), heat)
                 sign = np.where(force > forward, 1.0, np.where(force < backward, -1.0, 0.0))
@@ -181,7 +180,7 @@ def _going(
                 held &= sign == 0.0
             net = force - resisting(q, going, heat)
             new = v + np.where(held, 0.0, net / values[0]) * step
-            # Whoever turns back stops first: whether it goes on is asked at the next step.
+            # At a reversal the axis stops; the next step decides whether it moves again.
             new = np.where(v * new < 0.0, 0.0, new)
             q, v = q + 0.5 * (v + new) * step, new
         change[:, k] = (v - rate[:, k]) * motion.sample_rate
@@ -191,10 +190,10 @@ def _going(
 def relative_rate_error(
     motions: Sequence[Motion], terms: Terms, values: Array, delay: float = 0.0
 ) -> float:
-    """RMS of simulated less measured rate over that of the measured one."""
+    """RMS of simulated less measured rate over RMS of the measured rate."""
     over, under = 0.0, 0.0
     for motion in motions:
-        # Friction that drives, as a swapped sign makes it, runs away: infinite, and no warning.
+        # Negative friction, as by a wrong sign, diverges: infinite, without a warning.
         with np.errstate(over="ignore", invalid="ignore"):
             rate = driven_motion(motion, terms, values, delay).rate
             over += float(np.sum((rate - motion.rate[: len(rate)]) ** 2))

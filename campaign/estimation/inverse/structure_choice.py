@@ -1,7 +1,7 @@
 """Choice of terms: cross-validation by blocks and an information criterion.
 
-A lower criterion on the rows of a fit can be worse on others, so that both are told, and both have
-to fall: each further term must clearly lower the error on blocks that the fit has not seen.
+A term that improves the criterion on the rows of a fit can increase the error on other rows.
+Therefore both must decrease: each further term must clearly lower the error on held-out blocks.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from campaign.estimation.inverse.rows import in_blocks, part, rows
 from campaign.estimation.inverse.terms import Term
 
 BLOCKS = 10
-"""of rows that follow each other, each left out once."""
+"""Blocks of consecutive rows, each held out once."""
 ALIKE = 300.0
-"""Condition number of columns of unit length beyond which two look alike in these motions."""
+"""Condition number of columns of unit length above which two are almost equal in these motions."""
 CLEARLY = 2.0
 """Paired standard errors over blocks by which a further term must lower the error."""
 
 
 @dataclass(frozen=True)
 class Structure:
-    """A set of terms, and how well it does.
+    """A set of terms with its fit and its errors.
 
     Attributes:
         fit: on all rows.
-        held_out: norm of what blocks left out leave over, over that of the force.
-        by_block: mean square on each block that was left out, shape (blocks,).
+        held_out: norm of the error on held-out blocks, over that of the force.
+        by_block: mean square error on each held-out block, shape (blocks,).
         criterion: Bayesian information criterion with the effective number of rows.
     """
 
@@ -45,7 +45,7 @@ class Structure:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its terms."""
+        """Names of the terms."""
         return tuple(term.name for term in self.terms)
 
 
@@ -58,10 +58,10 @@ def structure(
 ) -> Structure:
     """Fit these terms to all motions, and to all but each block.
 
-    effective: rows that count for the criterion; the fit's own where absent. Criteria that are
-        compared have the same.
+    effective: number of rows in the criterion; default: that of the fit. It must be the same in
+        criteria that are compared.
 
-    Raises ValueError where columns cannot be told apart, of all rows or of all but some.
+    Raises ValueError where columns are dependent, in all rows or without one block.
     """
     pieces = [rows(motion, terms, filtering, delay) for motion in motions]
     fit = regress(pieces)
@@ -73,19 +73,19 @@ def structure(
 
 
 def criterion(fit: Regression, count: float) -> float:
-    """Bayesian information criterion of a fit whose rows are worth `count` independent ones."""
+    """Bayesian information criterion of a fit with the effective sample size `count`."""
     square = max(fit.relative**2, float(np.finfo(float).tiny))
     return count * math.log(square) + len(fit.values) * math.log(max(count, 2.0))
 
 
 def held_out(pieces: Sequence[Piece]) -> tuple[Array, float]:
-    """Squared error and rows of each block that was left out, shape (blocks, 2); squared force.
+    """Squared error and rows of each held-out block, shape (blocks, 2); squared force.
 
-    Normal equations of all rows less those of the block: nothing is fitted anew.
+    By subtraction of the block from the normal equations of all rows, without a new regression.
     """
     whole = sum(p.columns.T @ p.columns for p in pieces)
     right = sum(p.columns.T @ p.force for p in pieces)
-    found, norm = [], 0.0
+    errors, norm = [], 0.0
     for piece, blocks in zip(pieces, in_blocks(pieces, BLOCKS), strict=True):
         for block in blocks:
             own = part(piece, block)
@@ -94,9 +94,9 @@ def held_out(pieces: Sequence[Piece]) -> tuple[Array, float]:
                 raise ValueError("some terms rest on one part of the motion alone")
             values = np.linalg.solve(left, right - own.columns.T @ own.force)
             error = own.force - own.columns @ values
-            found.append((float(error @ error), len(error)))
+            errors.append((float(error @ error), len(error)))
             norm += float(own.force @ own.force)
-    return np.array(found), norm
+    return np.array(errors), norm
 
 
 def choose(
@@ -106,28 +106,28 @@ def choose(
     filtering: FilterSettings,
     delay: float = 0.0,
 ) -> tuple[list[Structure], int]:
-    """Groups of terms added one by one to `start` while blocks left out gain by it.
+    """Add groups of terms one by one to `start` while they lower the error on held-out blocks.
 
-    Of a family of terms at most one is added. Returns every structure that was tried, the start
-    first, and the index of the chosen one.
+    At most one term of a family is added. Returns all tried structures, the start first, and the
+    index of the chosen one.
     """
     tried = [structure(motions, start, filtering, delay)]
     effective = tried[0].fit.effective
     chosen, open_groups = 0, list(candidates)
     while open_groups:
-        found = []
+        larger = []
         for group in open_groups:
             terms = (*tried[chosen].terms, *group)
             try:
-                found.append((group, structure(motions, terms, filtering, delay, effective)))
-            except ValueError:  # nothing in these motions tells it
+                larger.append((group, structure(motions, terms, filtering, delay, effective)))
+            except ValueError:  # these motions do not determine it
                 continue
-            if found[-1][1].fit.likeness > ALIKE:
-                found.pop()
-        if not found:
+            if larger[-1][1].fit.likeness > ALIKE:
+                larger.pop()
+        if not larger:
             break
-        tried += [each for _, each in found]
-        group, best = min(found, key=lambda pair: pair[1].held_out)
+        tried += [each for _, each in larger]
+        group, best = min(larger, key=lambda pair: pair[1].held_out)
         before = tried[chosen]
         if not (clearly_better(best, before) and best.criterion < criterion(before.fit, effective)):
             break
@@ -142,7 +142,7 @@ def choose(
 
 
 def clearly_better(new: Structure, old: Structure) -> bool:
-    """Whether blocks left out gain, on average, by more than their scatter explains."""
+    """Whether the mean square error on held-out blocks decreases by more than their scatter."""
     gain = old.by_block - new.by_block
     error = float(np.std(gain, ddof=1)) / math.sqrt(len(gain)) if len(gain) > 1 else math.inf
     return float(np.mean(gain)) > CLEARLY * error

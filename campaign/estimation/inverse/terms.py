@@ -2,7 +2,7 @@
 
     force = inertia * acceleration + viscous * rate + coulomb * sign(rate) + offset + ...
 
-Units are those of a rotary axis; of a linear one they follow (`campaign.axis_kind`).
+Units are those of a rotary axis; `campaign.axis_kind` converts them for a linear one.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ class Term:
 
     Attributes:
         name: of its coefficient.
-        symbol: as it stands in the model's formula.
+        symbol: in the model's formula.
         unit: of the coefficient (SI, rotary).
         meaning: one sentence.
         column: of shape (n,), from a motion before decimation.
-        bench: key of the bench file that the coefficient is, or "".
-        family: terms of one family describe one thing, and a model has at most one of them: with
-            two, each has a coefficient that means nothing by itself.
+        bench: key of the coefficient in the bench file, or "".
+        family: terms of one family describe the same effect, and a model has at most one of them:
+            with two, neither coefficient has a meaning alone.
     """
 
     name: str
@@ -51,7 +51,7 @@ def _negative(motion: Motion) -> Array:
 
 
 WARM = 20.0
-"""degC at which friction is the plain terms'; those over temperature say how it differs from it."""
+"""Reference (degC) at which the terms over temperature are zero."""
 
 
 def _warmer(motion: Motion) -> Array:
@@ -97,7 +97,7 @@ ALL = (
          "How that change bends, as of a viscosity that falls exponentially.",
          lambda m: _warmer(m) ** 2 * m.rate),
 )  # fmt: skip
-"""Terms by their names; those of a position's period are made by `periodic`."""
+"""Terms by their names; `periodic` returns those of a spatial period."""
 TERMS: Mapping[str, Term] = {term.name: term for term in ALL}
 SYMMETRIC = ("inertia", "viscous", "coulomb", "offset")
 DIRECTIONAL = (
@@ -107,11 +107,11 @@ DIRECTIONAL = (
     "coulomb_positive",
     "coulomb_negative",
 )
-"""Both directions of their own; a constant besides could not be told from their difference."""
+"""Separate terms of both directions, without an offset, which depends on their difference."""
 
 
 def periodic(period: float) -> tuple[Term, ...]:
-    """Force and friction that repeat every `period` (rad, or m): sine and cosine of each."""
+    """Terms of force and friction with a `period` (rad, or m): sine and cosine of each."""
 
     def wave(motion: Motion, shape: Callable[[Array], Array]) -> Array:
         return np.asarray(shape(2.0 * np.pi * motion.position / period))
@@ -129,5 +129,5 @@ def periodic(period: float) -> tuple[Term, ...]:
 
 
 def columns(motion: Motion, terms: Terms) -> Array:
-    """All columns beside each other, shape (n, k)."""
+    """Columns of all terms, shape (n, k)."""
     return np.column_stack([term.column(motion) for term in terms])

@@ -15,9 +15,9 @@ from campaign.estimation.inverse.regression import effective_count
 from campaign.reason import Cause
 
 REPEATS, SEED = 2000, 1
-"""of the resampling."""
+"""Number of resamplings, and seed."""
 FEWEST_BLOCKS = 8
-"""Blocks of rows that know of each other: with fewer, no bootstrap says anything."""
+"""Fewest blocks of correlated rows for a bootstrap."""
 TOO_FEW_BLOCKS = Cause(
     "too few independent blocks", "only {blocks} parts of the motion are uncorrelated"
 )
@@ -25,7 +25,7 @@ TOO_FEW_BLOCKS = Cause(
 
 @dataclass(frozen=True)
 class Prediction:
-    """Rows of a motion and what a model says of them; all of shape (n,), in the force's unit."""
+    """Rows of a motion with the prediction of a model; shape (n,), forces in one unit."""
 
     time: Array
     force: Array
@@ -33,27 +33,27 @@ class Prediction:
 
     @property
     def residuals(self) -> Array:
-        """What is left over."""
+        """Force less prediction."""
         return self.force - self.predicted
 
     @property
     def relative(self) -> float:
-        """Norm of what is left over, over that of the force."""
+        """Norm of the residuals over that of the force."""
         return float(np.linalg.norm(self.residuals) / np.linalg.norm(self.force))
 
 
 def relative_error(name: str, prediction: Prediction) -> Estimate:
-    """The relative residual, with an interval over blocks of the motion."""
+    """Relative residual, with an interval over blocks of the motion."""
     return _by_blocks(name, (prediction,))
 
 
 def improvement(name: str, one: Prediction, other: Prediction) -> Estimate:
-    """How much lower the relative residual of `other` is than that of `one`, on the same rows."""
+    """Decrease of the relative residual from `one` to `other`, on the same rows."""
     return _by_blocks(name, (one, other))
 
 
 def _by_blocks(name: str, sides: tuple[Prediction, ...]) -> Estimate:
-    """Circular blocks, longer than residuals know of each other (Politis and Romano, 1992)."""
+    """Bootstrap of circular blocks, longer than the correlation (Politis and Romano, 1992)."""
     squares = [side.residuals**2 for side in sides]
     norm = sides[0].force ** 2
     count = len(norm)

@@ -1,6 +1,6 @@
 """Bristle stiffness, bristle damping and inertia from motion below breakaway, by output error.
 
-`plant` is what moves, `simulation` how it answers to a torque, `record` what was measured, `fit`
-the joint fit over trials, `uncertainty` what its intervals rest on, `shape` whether a single
-bristle describes the data at all, `found` the numbers for a reader.
+`plant`: model; `simulation`: its response to a torque; `record`: measured data; `fit`: joint fit
+over trials; `uncertainty`: covariance of its parameters; `shape`: test whether a single bristle
+describes the data; `presliding_fit`: estimates.
 """

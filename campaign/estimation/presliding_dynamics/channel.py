@@ -9,23 +9,23 @@ import numpy as np
 from campaign.arrays import Array, Flags
 
 MOST_ORDER = 12
-"""Of the autoregression of a channel's noise."""
+"""Highest order of the autoregression of a channel's noise."""
 DRIFT = {"rate": 2, "angle": 1}
-"""Coefficients of the polynomial that each channel may be off by: offset, drift."""
+"""Number of coefficients of each channel's error polynomial: offset, drift."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A measured channel of a record, and what is taken out of it.
+    """A measured channel of a record, with its offset, drift and noise model.
 
     Attributes:
         name: `rate` or `angle`.
-        samples: measured (rad/s or rad), 0 where lost, shape (n,).
-        kept: which samples are there.
-        there: 1 where a whitened sample is there, else 0, shape (n,).
+        samples: measured (rad/s or rad), 0 for missing ones, shape (n,).
+        kept: mask of the valid samples.
+        there: 1 for valid whitened samples, otherwise 0, shape (n,).
         basis: orthonormal columns of whitened offset and drift, shape (n, q).
-        deviation: of its residuals, whitened (rad/s or rad).
-        whitening: 1, -a1, -a2, ... of the autoregression that its noise is taken for.
+        deviation: of its whitened residuals (rad/s or rad).
+        whitening: 1, -a1, -a2, ... of the autoregression of its noise.
     """
 
     name: str
@@ -40,24 +40,24 @@ class Channel:
     def of(
         cls, name: str, samples: Array, kept: Flags, deviation: float, whitening: Array
     ) -> Channel:
-        """With what follows from those: a sample after a lost one cannot be whitened."""
+        """Channel with derived attributes; a sample after a missing one cannot be whitened."""
         there = kept.copy()
         for lag in range(1, len(whitening)):
             there[lag:] &= kept[:-lag]
-        # The first samples have no past; what is before them is not known to be 0.
+        # The past of the first samples is unknown, not 0.
         there[: len(whitening) - 1] = False
         powers = np.vander(np.linspace(-1.0, 1.0, len(kept)), DRIFT[name])
         basis = np.linalg.qr(filtered(powers, whitening) * there[:, None])[0]
         return cls(name, samples, kept, there.astype(float), basis, deviation, whitening)
 
     def left(self, values: Array) -> Array:
-        """What is left of values (n, ...) without offset and drift, whitened, in deviations."""
+        """Values (n, ...) whitened, without offset and drift, in deviations."""
         shown = (filtered(values, self.whitening).T * self.there).T
         return np.asarray((shown - self.basis @ (self.basis.T @ shown)) / self.deviation)
 
 
 def filtered(values: Array, whitening: Array) -> Array:
-    """Values (n, ...) through the filter of an autoregression."""
+    """Filter values (n, ...) by the whitening filter of an autoregression."""
     from scipy.signal import lfilter
 
     if len(whitening) == 1 or not values.size:
@@ -66,13 +66,13 @@ def filtered(values: Array, whitening: Array) -> Array:
 
 
 def white_noise(samples: Array) -> float:
-    """Deviation of white noise on a smooth course, by second differences; never 0."""
+    """Deviation of white noise on a smooth signal, by second differences; never 0."""
     rough = float(np.std(np.diff(samples, 2))) / np.sqrt(6.0)
     return float(max(rough, 1e-4 * np.std(samples), np.finfo(float).tiny))
 
 
 def autoregression(residuals: Array) -> Array:
-    """1, -a1, ... of residuals (n,), by the recursion of Levinson and Durbin."""
+    """Whitening filter 1, -a1, ... of residuals (n,), by the Levinson-Durbin recursion."""
     count = len(residuals)
     most = min(MOST_ORDER, count // 20)
     covariance = np.array([residuals[lag:] @ residuals[: count - lag] for lag in range(most + 1)])

@@ -1,13 +1,13 @@
 """Torque of a drive without sensor noise, and its uncertainty.
 
-A simulation that is fed with a noisy torque answers to the noise as well: what is fitted is too
-stiff, too damped and too heavy, by the noise's share of the power (Soderstrom, "Errors-in-variables
-methods in system identification", Automatica 43, 2007). But the torque is what drive and load make
-of a command that is known, and nearly linearly so: it is regressed on past commands. What is left
-to doubt of it then is no noise any more, but a few smooth directions, whose factors a joint fit of
-the motion finds together with the plant. Friction that yields makes the load's motion, and through
-back-EMF the torque, no linear answer to the command: for that the torque is regressed on the motion
-as well, once a first fit can tell that without noise.
+A simulation with a noisy torque also responds to the noise: then stiffness, damping and inertia are
+too large, by the noise's share of the power (Soderstrom, "Errors-in-variables methods in system
+identification", Automatica 43, 2007). But the torque is an almost linear response of drive and load
+to a known command. Therefore it is regressed on past commands. The remaining error is no noise, but
+lies in a few smooth directions; a joint fit of the motion estimates their factors with the plant.
+Yielding friction makes the motion, and through back-EMF the torque, a nonlinear response to the
+command. Therefore the torque is also regressed on the motion, once a first fit simulates it without
+noise.
 """
 
 from __future__ import annotations
@@ -21,38 +21,38 @@ from numpy.typing import NDArray
 from campaign.arrays import Array
 
 PER_PERIOD = 3.0
-"""Lags in a period of the highest frequency: more would tell the same."""
+"""Lags per period of the highest frequency; more lags add no information."""
 FINE = 2.0
-"""Such lags up to which each sample is one of its own: a drive answers within them, to a command
-as to the back-EMF of a motion."""
+"""Number of such lags within which every sample is a lag, because the drive responds that fast to a
+command and to the back-EMF of a motion."""
 MOST_FINE = 30
-"""samples up to there at most."""
+"""Most samples of that range."""
 LAGS = 60
-"""of the command: 20 periods of the highest frequency. Back-EMF makes the torque remember what the
-load does, for as long as a lightly damped mode rings; a memory too short is a torque that is wrong,
-and one too long costs time only."""
+"""Lags of the command: 20 periods of the highest frequency. Through back-EMF the torque depends on
+past motion for as long as a lightly damped mode rings. Too few lags cause an error of the torque,
+too many cost only time."""
 PER_LAG = 4
-"""Shortest trial over the longest lag, at least."""
+"""Least ratio of the shortest trial to the longest lag."""
 ALIKE = 1e-9
-"""Share of a column that must be its own, or it is told by the ones before."""
+"""Least share of a column that is independent of the previous ones."""
 FAINT = 0.003
-"""Share of a direction within the band below which it is left out: it moves nothing."""
+"""Share of a direction within the band below which it is omitted, because it has no effect."""
 CLEAN = 0.1
-"""Bias that the torque's noise makes over the scatter that it makes, below which a torque is taken
-as it was measured: a share of noise makes a bias of its square, and a scatter that falls with how
-many samples tell it. The regression leaves out more then, as friction is not linear."""
+"""Ratio of the bias by the torque's noise to its scatter, below which the measured torque is used.
+The bias is proportional to the square of the noise, and the scatter decreases with the number of
+samples. Then the error of the regression, with nonlinear friction, would be larger."""
 ABOVE = 1.5
-"""of the highest frequency: from there on a torque has nothing but the noise of its sensor."""
+"""Multiple of the highest frequency above which a torque contains only sensor noise."""
 
 
 @dataclass(frozen=True)
 class Driven:
-    """What a drive did in one trial that began at rest.
+    """Torque and command of a drive in one trial that begins at rest.
 
     Attributes:
         torque: measured (N m), shape (n,).
-        command: what was asked of it (N m), at any time (s) from 0 on.
-        motion: of the load as a fit tells it, rate or angle, shape (n,); None before any fit.
+        command: commanded torque (N m) as a function of time (s) from 0 on.
+        motion: of the load as simulated by a fit, rate or angle, shape (n,); None before any fit.
     """
 
     torque: Array
@@ -63,11 +63,10 @@ class Driven:
 def driven_torques(
     trials: Sequence[Driven], step: float, highest: float
 ) -> list[tuple[Array, Array]]:
-    """Torque of each trial, shape (n,), and the columns that it may be off by, shape (n, m).
+    """Torque of each trial, shape (n,), and columns of its errors, shape (n, m).
 
-    Their factors are standard normal, and the same in all trials. step: between samples (s);
-    highest: frequency up to which the torque matters (Hz). Raises ValueError where the trials are
-    too short.
+    Their factors are standard normal, and common to all trials. step: between samples (s); highest:
+    highest relevant frequency of the torque (Hz). Raises ValueError for trials that are too short.
     """
     lengths = [len(each.torque) for each in trials]
     places = np.cumsum(lengths)[:-1]
@@ -79,21 +78,21 @@ def driven_torques(
         columns = np.hstack([columns, np.concatenate([_past(each, fine) for each in motions])])
     moving = _directions(columns - offsets @ (offsets.T @ columns), places, step, highest)
     size = moving.T @ torque
-    found = offsets @ (offsets.T @ torque) + moving @ size
-    left = np.split(torque - found, places)
+    smooth = offsets @ (offsets.T @ torque) + moving @ size
+    left = np.split(torque - smooth, places)
     noise, telling = _noise(left, step, 0.0, highest, len(size))
     if not np.isfinite(noise):
         raise ValueError("too few samples to separate a torque from its noise: record longer")
-    # What is left within the band may be torque that is no linear answer; above it, it is noise.
+    # Residuals within the band may be nonlinear torque; above the band they are noise.
     sensor = min(noise, _noise(left, step, ABOVE * highest, np.inf)[0])
     if sensor * telling <= CLEAN * float(np.linalg.norm(size)):
         return [(each.torque, np.zeros((len(each.torque), 0))) for each in trials]
-    # Offsets are free in a fit as it is.
-    return list(zip(np.split(found, places), np.split(noise * moving, places), strict=True))
+    # Offsets need no columns: they are free in every fit.
+    return list(zip(np.split(smooth, places), np.split(noise * moving, places), strict=True))
 
 
 def _lags(shortest: int, step: float, highest: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """In samples: all of the first ones; and those with more, as far apart as the band allows."""
+    """Lags in samples: the first, dense ones; and these with later ones, spaced by the band."""
     lag = max(1, int(1.0 / (PER_PERIOD * highest * step)))
     fine = min(int(FINE * lag), MOST_FINE)
     count = min(LAGS, shortest // (PER_LAG * lag))
@@ -106,7 +105,7 @@ def _commanded(trial: Driven, step: float) -> Array:
 
 
 def _past(values: Array, lags: NDArray[np.intp]) -> Array:
-    """At all lags, shape (n, lags): 0 before the beginning."""
+    """Values at all lags, shape (n, lags): 0 before the beginning."""
     place = np.subtract.outer(np.arange(len(values)), lags)
     return np.where(place < 0, 0.0, values[np.maximum(place, 0)])
 
@@ -114,10 +113,10 @@ def _past(values: Array, lags: NDArray[np.intp]) -> Array:
 def _noise(
     left: Sequence[Array], step: float, low: float, high: float, taken: int = 0
 ) -> tuple[float, float]:
-    """Deviation of white noise that is as large between two frequencies, and how many tell it.
+    """Deviation of white noise from its power between two frequencies, and number of its values.
 
-    The deviation is per sample, and infinite where nothing tells it. taken: how many have gone into
-    a regression.
+    The deviation is per sample, and infinite where it is not determined. taken: number of fitted
+    parameters.
     """
     energy, count = 0.0, 0.0
     for part in left:
@@ -132,7 +131,7 @@ def _noise(
 
 
 def _directions(columns: Array, places: Array, step: float, highest: float) -> Array:
-    """An orthonormal basis of what columns (n, k) can be within the band, shape (n, m)."""
+    """Orthonormal basis of columns (n, k) within the band, shape (n, m)."""
     basis, triangle = np.linalg.qr(columns)
     own = np.abs(np.diag(triangle)) / np.linalg.norm(triangle, axis=0).clip(np.finfo(float).tiny)
     basis = basis[:, own > ALIKE]

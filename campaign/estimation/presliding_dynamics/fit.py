@@ -1,9 +1,9 @@
 """Joint output-error fit of a plant below breakaway to the records of several trials.
 
-What is fitted is the simulated answer, not an equation error: noise of rate and angle then biases
-nothing (Ljung, "System Identification", 2nd ed., section 7.2). The rate is compared as a rate, so
-that the gyro's noise is not integrated. Offset and slow drift of the gyro and the encoder's offset
-are linear, and are taken out of residuals and Jacobian in each record.
+The fit minimizes the error of the simulated answer, not an equation error: then noise of rate and
+angle causes no bias (Ljung, "System Identification", 2nd ed., section 7.2). The rate is compared as
+a rate, so that the gyro's noise is not integrated. Offset and slow drift of the gyro and the
+encoder's offset are linear; each record's residuals and Jacobian are projected to exclude them.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ from campaign.estimation.presliding_dynamics.record import Assumptions, Record, 
 from campaign.estimation.presliding_dynamics.start import first_plant
 
 EVALUATIONS = 60
-"""of a start at most; a fit that needs more has not converged."""
+"""Most evaluations from a start; a fit that needs more has not converged."""
 FEW = 8
-"""Likewise, of one with a parameter held near the best fit."""
+"""Most evaluations with one parameter fixed near the best fit."""
 TOLERANCE = 1e-8
-"""Relative change of the sum of squares at which a search ends: of 1e5 samples a hundredth of what
-a deviation of a parameter makes."""
+"""Relative change of the sum of squares at which a search ends: for 1e5 samples a hundredth of the
+change by one deviation of a parameter."""
 ROUNDS = 1
-"""in which each channel's deviation is taken from its own residuals."""
+"""Iterations that estimate each channel's deviation from its residuals."""
 
 
 def fit_presliding_dynamics(
     records: Sequence[Record], assumed: Assumptions | None = None
 ) -> JointFit:
-    """Fit sigma0, sigma1, J and what else is free to all records at once.
+    """Fit sigma0, sigma1, J and the other free parameters to all records at once.
 
-    Raises ValueError with the reason where there is no start, and where none can be simulated.
+    Raises ValueError with the reason where there is no start, or no start can be simulated.
     """
     best = first_fit(records, assumed)
     for _ in range(ROUNDS):
@@ -59,9 +59,9 @@ def fit_presliding_dynamics(
 
 
 def first_fit(records: Sequence[Record], assumed: Assumptions | None = None) -> JointFit:
-    """Likewise, to torques as they are told, without slopes: enough to tell the motion.
+    """First fit, with the given torques and without slopes: sufficient to simulate the motion.
 
-    The search begins at a linear fit of the spectra. Raises ValueError as above.
+    The search begins at a linear fit of the spectra. Raises as `fit_presliding_dynamics`.
     """
     if not records:
         raise ValueError("there is no record to fit")
@@ -71,11 +71,11 @@ def first_fit(records: Sequence[Record], assumed: Assumptions | None = None) -> 
     best: JointFit | None = None
     for start in _starts(first_plant(records, known)):
         try:
-            found = search(_prepared(records, start, known))
+            fit = search(_prepared(records, start, known))
         except ValueError:
             continue
-        if best is None or found.cost < best.cost:
-            best = found
+        if best is None or fit.cost < best.cost:
+            best = fit
         if best.reached:
             break
     if best is None:
@@ -86,7 +86,7 @@ def first_fit(records: Sequence[Record], assumed: Assumptions | None = None) -> 
 
 
 def _starts(begin: Plant) -> list[Plant]:
-    """The first plant; where that leads nowhere, one of springs and more damping."""
+    """Start plants: the first one; then, if that fails, linear springs with more damping."""
     bristles = begin.bristles[0]
     other: Bristles = replace(bristles, compliance=0.0, damping=2.0 * bristles.damping)
     return [begin, replace(begin, bristles=(other,))]
@@ -96,17 +96,17 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumptions) -> 
     parameters = Parameters.of(records, first, assumed)
     priors = np.zeros(parameters.size)
     priors[len(parameters.names) :] = 1.0
-    # Of the order of critical damping: all that is known of it beforehand.
+    # The only prior knowledge: it is of the order of critical damping.
     priors[parameters.names.index("viscous_friction")] = 1.0
     grids = tuple(Grid.of(record, first) for record in records)
     channels = tuple(
         tuple(
-            Channel.of(name, samples, there, white_noise(samples), np.ones(1))
-            for name, samples, there in measured(record)
+            Channel.of(name, samples, valid, white_noise(samples), np.ones(1))
+            for name, samples, valid in measured(record)
         )
         for record in records
     )
-    # A first search has the torque as it was told: what that may be off by would fit a wrong plant.
+    # The first search uses the given torque: free torque errors would fit a wrong plant.
     answers = tuple(
         np.zeros((len(each), *record.doubts.shape))
         for each, record in zip(channels, records, strict=True)
@@ -129,7 +129,7 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumptions) -> 
 
 
 def search(fit: JointFit, held: int | None = None) -> JointFit:
-    """From the vector of `fit` to where the sum of squares is least, with one parameter held.
+    """Minimize the sum of squares from the vector of `fit`, with one parameter fixed (`held`).
 
     Raises ValueError when the start cannot be simulated.
     """
@@ -141,7 +141,7 @@ def search(fit: JointFit, held: int | None = None) -> JointFit:
     priors = np.setdiff1d(np.flatnonzero(fit.priors), left)
     free = np.delete(np.arange(fit.parameters.size), left + ([] if held is None else [held]))
     low, high = fit.parameters.bounds()
-    # What the torque is off by is linear: the best of it follows from the rest of the vector.
+    # Torque errors are linear: their best factors follow from the rest of the vector.
     pairs = [zip(c, d, strict=True) for c, d in zip(fit.channels, fit.doubt_answers, strict=True)]
     columns = np.concatenate([c.left(each) for pair in pairs for c, each in pair])
     solved = np.linalg.inv(columns.T @ columns + np.eye(len(left)))
@@ -152,7 +152,7 @@ def search(fit: JointFit, held: int | None = None) -> JointFit:
         return vector
 
     def moved(misses: Array) -> Array:
-        """By how much the factors of the doubts are to move, for what is missed with `taken`."""
+        """Change of the factors of torque errors from `taken`, for the residuals with `taken`."""
         return np.asarray(-solved @ (columns.T @ misses + fit.taken))
 
     def missed(part: Array) -> Array:
@@ -176,7 +176,7 @@ def search(fit: JointFit, held: int | None = None) -> JointFit:
     with np.errstate(over="ignore", invalid="ignore"):
         if not np.all(np.isfinite(residuals(fit.vector[free]))):
             raise ValueError("the start of the fit cannot be simulated")
-        found = least_squares(
+        result = least_squares(
             residuals,
             fit.vector[free],
             jacobian,
@@ -187,36 +187,36 @@ def search(fit: JointFit, held: int | None = None) -> JointFit:
             xtol=TOLERANCE,
             gtol=TOLERANCE,
         )
-    best = whole(found.x)
-    best[doubted] += moved(missed(found.x))
+    best = whole(result.x)
+    best[doubted] += moved(missed(result.x))
     return replace(
         fit,
         vector=best,
         residuals=tuple(residuals_of(fit, number, best) for number in everything),
-        cost=2.0 * float(found.cost),
-        reached=found.status > 0,
+        cost=2.0 * float(result.cost),
+        reached=result.status > 0,
     )
 
 
 def _reweighted(fit: JointFit) -> JointFit:
-    """With each channel's deviation as its residuals have it."""
+    """Set the deviation of each channel from its residuals."""
     return _with_noise(fit, lambda left: np.ones(1))
 
 
 def whitened(fit: JointFit) -> JointFit:
-    """The fit again, with the noise of each channel taken for an autoregression.
+    """Repeat the fit with an autoregression as the noise of each channel.
 
-    Its order is chosen by Akaike's criterion, its coefficients follow from the residuals' own
-    correlation (Yule and Walker). White noise is left as it is.
+    Akaike's criterion selects its order; its coefficients follow from the autocorrelation of the
+    residuals (Yule and Walker). White noise stays white.
     """
     first = search(_with_noise(centred(fit), autoregression))
     return with_slopes(search(centred(_reweighted(first))))
 
 
 def _with_noise(fit: JointFit, whitening: Callable[[Array], Array]) -> JointFit:
-    """With the noise of the record that is in the middle: all of them have the same sensors.
+    """Set the noise of all records, which have the same sensors, to the median of theirs.
 
-    One that the model misses would else be taken for a noisy one, and not be missed.
+    Otherwise a record with a model error would count as noisy, and hide the error.
     """
     seen: dict[str, list[tuple[float, Array]]] = {}
     for group, residuals in zip(fit.channels, fit.residuals, strict=True):
@@ -226,7 +226,7 @@ def _with_noise(fit: JointFit, whitening: Callable[[Array], Array]) -> JointFit:
             freedom = max(np.sum(channel.there) - channel.basis.shape[1], 1.0)
             deviation = channel.deviation * float(np.sqrt(grown @ grown / freedom))
             least = 1e-9 * float(np.std(channel.samples))
-            # What was whitened before is whitened again.
+            # The new filter follows the previous whitening.
             whole = np.convolve(channel.whitening, own)
             seen.setdefault(channel.name, []).append((max(deviation, least), whole))
     noise = {

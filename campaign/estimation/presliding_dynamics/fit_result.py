@@ -21,15 +21,15 @@ from campaign.estimation.presliding_dynamics.simulation import (
 DIFFERENCE = 1e-6
 """Step of the Jacobian's differences, in the vector's units."""
 DELAYS = (("rate_delay",), ("angle_delay",))
-"""Parameters that move no load: another look at the same motion."""
+"""Parameters that do not change the motion, only its samples."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """What drives the simulation of a record.
+    """Torque input of the simulation of a record.
 
     Attributes:
-        torque: at every half step, shape (steps, 3): beginning, middle and end of each (N m).
+        torque: at beginning, middle and end of each step, shape (steps, 3) (N m).
         per_sample: steps per sample.
     """
 
@@ -38,7 +38,7 @@ class Grid:
 
     @classmethod
     def of(cls, record: Record, plant: Plant) -> Grid:
-        """Fine enough for a plant."""
+        """Grid that is fine enough for a plant."""
         count = steps_per_sample(plant, record.step, record.highest_frequency())
         return cls(torque_on_grid(record.torque, count), count)
 
@@ -48,18 +48,18 @@ class JointFit:
     """A joint fit.
 
     Attributes:
-        records: that were fitted.
+        records: the fitted records.
         parameters: layout of the vector.
-        vector: where the sum of squares is least.
+        vector: minimum of the sum of squares.
         channels: of each record.
         grids: torque of each record, on its grid.
-        doubt_answers: what the channels of each record answer to the columns that its torque may
-            be off by, shape (channels, n, m).
-        taken: the factors of those columns that `grids` have in them, shape (m,).
+        doubt_answers: response of the channels of each record to the error columns of its torque,
+            shape (channels, n, m).
+        taken: the factors of those columns that `grids` include, shape (m,).
         residuals: of each record: measured less simulated, without offset and drift, in
             deviations, shape (channels, n).
-        jacobians: derivatives of the simulated by the vector, likewise, (channels, n, size).
-        priors: derivatives of what is known beforehand, of each record's own above all, (size,).
+        jacobians: derivatives of simulated samples by the vector, likewise, (channels, n, size).
+        priors: derivatives of the prior terms, mainly of the records' own parameters, (size,).
         cost: sum of squares, priors included.
         reached: whether the search ended in a minimum.
     """
@@ -79,7 +79,7 @@ class JointFit:
 
     @property
     def plant(self) -> Plant:
-        """That fits best."""
+        """Plant of the best fit."""
         return self.parameters.plant(self.vector)
 
     def motion(self, number: int) -> Motion:
@@ -92,14 +92,14 @@ class JointFit:
 
     @property
     def information(self) -> Array:
-        """Of all parameters, with what is known beforehand, shape (size, size)."""
-        found = np.diag(self.priors**2)
+        """Information of all parameters, with the priors, shape (size, size)."""
+        total = np.diag(self.priors**2)
         for slopes in self.jacobians:
-            found = found + products(slopes, slopes)
-        return found
+            total = total + products(slopes, slopes)
+        return total
 
     def largest_yielding(self, number: int) -> float:
-        """Largest bristle torque of a record over that at which the bristles slip, as fitted."""
+        """Largest bristle torque of a record over the fitted slip torque of the bristles."""
         bent = self.motion(number).bristle_torque[:, 0]
         return float(np.max(np.abs(bent))) * abs(self.plant.bristles[0].compliance)
 
@@ -116,11 +116,11 @@ def with_slopes(fit: JointFit) -> JointFit:
 
 
 def with_doubts(fit: JointFit) -> JointFit:
-    """With the torque that fits best, and what the plant answers to what it may be off by.
+    """Add the torque of the best fit and the plant's response to errors of the torque.
 
-    What the torque is off by is small, so that the plant's answer to it is linear.
+    These errors are small, so that the response is linear.
     """
-    fit, found = centred(fit), []
+    fit, responses = centred(fit), []
     for number, record in enumerate(fit.records):
         here = _answers(fit, number, fit.vector)
         answers = np.zeros((*here.shape, record.doubts.shape[1]))
@@ -129,12 +129,12 @@ def with_doubts(fit: JointFit) -> JointFit:
                 fit, number, fit.grids[number].torque + _on_grid(fit, number, column)
             )
             answers[:, :, index] = _answers(pushed, number, fit.vector) - here
-        found.append(answers)
-    return replace(fit, doubt_answers=tuple(found))
+        responses.append(answers)
+    return replace(fit, doubt_answers=tuple(responses))
 
 
 def centred(fit: JointFit) -> JointFit:
-    """With the torque that fits best: other plants answer to that as well."""
+    """Set the torque of the best fit, which is also the input of other plants."""
     factors = fit.vector[fit.parameters.doubted]
     moved = replace(fit, taken=factors)
     for number, record in enumerate(fit.records):
@@ -148,7 +148,7 @@ def _on_grid(fit: JointFit, number: int, torque: Array) -> Array:
 
 
 def with_torque(fit: JointFit, number: int, torque: Array) -> JointFit:
-    """With another torque on the grid of a record, shape (steps, 3)."""
+    """Set the torque on the grid of a record, shape (steps, 3)."""
     grids = list(fit.grids)
     grids[number] = replace(grids[number], torque=torque)
     return replace(fit, grids=tuple(grids))
@@ -178,49 +178,49 @@ def _answers(fit: JointFit, number: int, vector: Array, plant: Plant | None = No
 
 
 def _seen(fit: JointFit, number: int, motion: Motion, vector: Array) -> Array:
-    """What the channels of a record show of a motion, shape (channels, n)."""
-    told = []
+    """Samples of a motion in the channels of a record, shape (channels, n)."""
+    seen = []
     for channel in fit.channels[number]:
         at = motion.rate_at if channel.name == "rate" else motion.angle_at
-        told.append(at(fit.parameters.delay(vector, channel.name)))
-    return np.array(told) + fit.doubt_answers[number] @ (vector[fit.parameters.doubted] - fit.taken)
+        seen.append(at(fit.parameters.delay(vector, channel.name)))
+    return np.array(seen) + fit.doubt_answers[number] @ (vector[fit.parameters.doubted] - fit.taken)
 
 
 def residuals_of(fit: JointFit, number: int, vector: Array) -> Array:
     """Measured less simulated, without offset and drift, in deviations, shape (channels, n)."""
     answers = _answers(fit, number, vector)
     pairs = zip(fit.channels[number], answers, strict=True)
-    return np.array([channel.left(channel.samples - told) for channel, told in pairs])
+    return np.array([channel.left(channel.samples - answer) for channel, answer in pairs])
 
 
 def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
-    """Of the simulated, in deviations, shape (channels, n, size): forward differences."""
+    """Jacobian of the simulated samples, in deviations, (channels, n, size), by differences."""
     parameters, channels = fit.parameters, fit.channels[number]
     own = parameters.of_record(number)
     here = _motion(fit, number, vector)
     answers = _seen(fit, number, here, vector)
-    found = np.zeros((len(channels), len(fit.records[number].torque), len(vector)))
+    slopes = np.zeros((len(channels), len(fit.records[number].torque), len(vector)))
     doubts = zip(channels, fit.doubt_answers[number], strict=True)
-    found[:, :, parameters.doubted] = [c.left(each) for c, each in doubts]
+    slopes[:, :, parameters.doubted] = [c.left(each) for c, each in doubts]
     for index in (*range(len(parameters.names)), *range(own.start, own.stop)):
         moved = vector.copy()
         moved[index] += DIFFERENCE
         delay = parameters.names[index : index + 1] in DELAYS
         motion = here if delay else _motion(fit, number, moved)
         slope = (_seen(fit, number, motion, moved) - answers) / DIFFERENCE
-        found[:, :, index] = [c.left(each) for c, each in zip(channels, slope, strict=True)]
-    return found
+        slopes[:, :, index] = [c.left(each) for c, each in zip(channels, slope, strict=True)]
+    return slopes
 
 
 def unexplained(fit: JointFit, record: Record) -> float:
-    """Rms of what the fitted plant misses of another record, over that of the record's own motion.
+    """Rms residual of another record with the fitted plant, over the rms of its motion.
 
-    Of its first channel, offset and drift taken out of both. Nothing is fitted but those.
+    For its first channel, without offset and drift in both. Nothing else is fitted.
     """
     grid = Grid.of(record, fit.plant)
     channels = tuple(
-        Channel.of(name, samples, there, 1.0, np.ones(1))
-        for name, samples, there in measured(record)
+        Channel.of(name, samples, valid, 1.0, np.ones(1))
+        for name, samples, valid in measured(record)
     )
     own = 1 if record.at_rest else 3
     shared = fit.vector[: len(fit.parameters.names)]

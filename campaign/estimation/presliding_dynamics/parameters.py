@@ -1,10 +1,9 @@
 """The parameters of the joint fit as one vector, and back.
 
-What is asked for stands first, then what the torque of all records may be off by, then what is each
-record's own.
-Stiffness and inertia are logarithms, so that they stay positive and their intervals suit them.
-Damping, which may turn out to be nothing, is linear: it may leave its bound, and the fit then says
-so. Everything is scaled to be of order one.
+Order: the shared parameters, the factors of torque errors common to all records, then the own
+parameters of each record.
+Stiffness and inertia are logarithms, so that they and their intervals stay positive. Damping, which
+may be zero, is linear: a negative value is possible and visible. All are scaled to order one.
 """
 
 from __future__ import annotations
@@ -20,18 +19,17 @@ from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 
 LOGARITHMIC = ("bristle_stiffness", "inertia", "appendage_frequency", "appendage_inertia")
 FARTHEST = 7.0
-"""Logarithm by which a parameter may end away from its start: a factor of 1000."""
+"""Largest change of a logarithmic parameter from its start: a factor of 1000."""
 BOUNDS = {
     "damping": (-2.0, 50.0),
     "yielding": (-2.0, 2.0),
     "rate_delay": (-20.0, 20.0),
     "angle_delay": (-20.0, 20.0),
 }
-"""Between which others are looked for: over critical damping; largest torque over that at which the
-bristles would slip, above 1 of which the load breaks away; samples that a channel lags behind."""
+"""Bounds of other parameters: damping over critical damping; largest torque over the slip torque of
+the bristles (above 1 the load breaks away); delay of a channel in samples."""
 LARGEST_OFFSET = 1.0
-"""Scatter of what loads an axis besides its drive, over the largest torque: all that is said of it
-beforehand."""
+"""Prior standard deviation of a load torque besides the drive, over the largest torque."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +37,14 @@ class Parameters:
     """Layout and scale of the vector: shared parameters, then those of each record.
 
     Attributes:
-        names: of the shared ones; `damping` is the sum of sigma1 and sigma2, which is known well.
-        first: the plant that scales are taken from.
-        step: sampling step that delays are scaled by (s).
-        torque: that yielding is scaled by (N m), the largest of all records.
-        factors: how many factors of what the torque may be off by there are, of all records.
-        own: how many parameters each record has: offset of the torque; and bristle torque and rate
-            at the beginning of one that does not begin at rest.
+        names: of the shared ones; `damping` is the sum of sigma1 and sigma2, which the records
+            determine well.
+        first: plant for the scales.
+        step: sampling step, the scale of delays (s).
+        torque: scale of yielding (N m), the largest torque of all records.
+        factors: number of factors of torque errors, common to all records.
+        own: number of parameters of each record: offset of the torque; also bristle torque and rate
+            at the beginning of a record that does not begin at rest.
     """
 
     names: tuple[str, ...]
@@ -58,7 +57,7 @@ class Parameters:
 
     @classmethod
     def of(cls, records: Sequence[Record], first: Plant, assumed: Assumptions) -> Parameters:
-        """Those that the records and what is assumed leave open."""
+        """Parameters that are free with these records and assumptions."""
         names = ["bristle_stiffness", "damping", "yielding", "inertia", "viscous_friction"]
         names += ["rate_delay"] if any(r.rate is not None for r in records) else []
         names += ["angle_delay"] if any(r.angle is not None for r in records) else []
@@ -76,26 +75,26 @@ class Parameters:
 
     @property
     def size(self) -> int:
-        """Of the whole vector."""
+        """Size of the whole vector."""
         return self.common + sum(self.own)
 
     @property
     def common(self) -> int:
-        """How many stand before those of the records."""
+        """Number of parameters before those of the records."""
         return len(self.names) + self.factors
 
     @property
     def doubted(self) -> slice:
-        """Where the factors of what the torque may be off by stand."""
+        """Position of the factors of torque errors."""
         return slice(len(self.names), self.common)
 
     def of_record(self, number: int) -> slice:
-        """Where the parameters of a record stand."""
+        """Position of the parameters of a record."""
         begin = self.common + sum(self.own[:number])
         return slice(begin, begin + self.own[number])
 
     def start(self) -> Array:
-        """The vector of the first plant."""
+        """Vector of the first plant."""
         first, bristles, part = self.first, self.first.bristles[0], self.first.appendage
         values = {
             "bristle_stiffness": np.log(bristles.stiffness),
@@ -118,7 +117,7 @@ class Parameters:
         return 2.0 * float(np.sqrt(self.first.stiffness * self.first.inertia))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Between which the vector is looked for: wide, and no end of them is an answer."""
+        """Wide bounds of the search for the vector; a value at a bound is no result."""
         low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         start = self.start()
         for index, name in enumerate(self.names):
@@ -129,32 +128,32 @@ class Parameters:
         return low, high
 
     def plant(self, vector: Array) -> Plant:
-        """What the shared parameters say."""
-        told = dict(zip(self.names, map(float, vector), strict=False))
-        viscous = told["viscous_friction"] * self.damping_scale
+        """Plant of the shared parameters."""
+        values = dict(zip(self.names, map(float, vector), strict=False))
+        viscous = values["viscous_friction"] * self.damping_scale
         bristles = Bristles(
-            float(np.exp(told["bristle_stiffness"])),
-            told["damping"] * self.damping_scale - viscous,
-            told["yielding"] / self.torque,
+            float(np.exp(values["bristle_stiffness"])),
+            values["damping"] * self.damping_scale - viscous,
+            values["yielding"] / self.torque,
         )
         part: Appendage | None = self.assumed.appendage
-        if part is not None and "appendage_frequency" in told:
+        if part is not None and "appendage_frequency" in values:
             part = Appendage(
-                float(np.exp(told["appendage_inertia"])),
-                float(np.exp(told["appendage_frequency"])),
-                told["appendage_damping_ratio"],
+                float(np.exp(values["appendage_inertia"])),
+                float(np.exp(values["appendage_frequency"])),
+                values["appendage_damping_ratio"],
             )
-        return Plant(float(np.exp(told["inertia"])), (bristles,), viscous, part)
+        return Plant(float(np.exp(values["inertia"])), (bristles,), viscous, part)
 
     def delay(self, vector: Array, channel: str) -> float:
-        """Of a channel behind the torque (s); 0 of one that no record of the fit has."""
+        """Delay of a channel after the torque (s); 0 for one that no record of the fit has."""
         name = f"{channel}_delay"
         if name not in self.names:
             return 0.0
         return float(vector[self.names.index(name)]) * self.step
 
     def in_units(self, vector: Array, name: str) -> tuple[float, float]:
-        """A parameter's value (SI), and what a change by 1 in the vector is worth there."""
+        """Value of a parameter (SI), and its derivative by the vector."""
         index = self.names.index(name)
         value = float(vector[index])
         if name in LOGARITHMIC:

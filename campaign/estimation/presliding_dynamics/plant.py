@@ -21,7 +21,7 @@ class Bristles:
     Attributes:
         stiffness: sigma0 (N m/rad).
         damping: sigma1 (N m s/rad).
-        compliance: 1 / Ts (1/(N m)): how much the bristles yield; 0: they are a spring.
+        compliance: 1 / Ts (1/(N m)), the yielding of the bristles; 0: a linear spring.
         coulomb_share: c = Tc / Ts.
         stribeck_velocity: vs (rad/s); infinite: s does not depend on the rate.
         stribeck_exponent: delta.
@@ -37,12 +37,12 @@ class Bristles:
 
 @dataclass(frozen=True)
 class Appendage:
-    """An elastic part of the load, which no sensor sees.
+    """An elastic part of the load, without a sensor.
 
     Attributes:
         inertia: its own, a part of the plant's (kg m^2).
-        frequency: its natural frequency when the load is held (Hz).
-        damping_ratio: of that.
+        frequency: natural frequency with a fixed load (Hz).
+        damping_ratio: of that mode.
     """
 
     inertia: float
@@ -68,10 +68,10 @@ class Plant:
 
     @property
     def stiffness(self) -> float:
-        """Of all bristles together (N m/rad)."""
+        """Stiffness of all bristles together (N m/rad)."""
         return sum(each.stiffness for each in self.bristles)
 
     @property
     def natural_frequency(self) -> float:
-        """Of the load on its bristles (Hz)."""
+        """Natural frequency of the load on its bristles (Hz)."""
         return float(np.sqrt(self.stiffness / self.inertia) / (2.0 * np.pi))

@@ -1,4 +1,4 @@
-"""Numbers of an axis from records below breakaway, or the reason for none."""
+"""Estimates of an axis from records below breakaway, or the reason for none."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ UNITS = {
 }
 POSITIVE = ("damping", "viscous_friction", "appendage_damping_ratio")
 UNSCALED = ("rate_delay", "angle_delay", "yielding")
-"""Whose size says nothing of how far an error of the model may move them."""
+"""Parameters to which a model error does not add a part proportional to their size."""
 PROFILED = ("bristle_stiffness", "damping", "inertia")
-"""Whose limits are looked for along the profile where an interval is wide."""
+"""Parameters with limits along the profile where an interval is wide."""
 SLIPPING = 0.95
-"""Bristle torque over that at which they slip, as fitted, from which on a load breaks away."""
+"""Bristle torque over the fitted slip torque above which a load breaks away."""
 NO_MINIMUM = Cause("no minimum", "the search did not end in a minimum")
 BREAKS_AWAY = Cause(
     "breakaway in a record",
@@ -70,11 +70,11 @@ class PreslidingDynamics:
     """Result of a joint fit below breakaway.
 
     Attributes:
-        estimates: by name, all of `UNITS` that were free, where `damping` is the sum of sigma1 and
-            sigma2; and what follows from them: `bristle_damping` sigma1 (N m s/rad),
-            `damping_ratio` of the sum, and `natural_frequency` (Hz).
-        fit, spread, misfit: what they rest on.
-        reason: why none of them has an interval; none: it is each one's own.
+        estimates: by name, all free parameters of `UNITS`, where `damping` is the sum of sigma1
+            and sigma2; with derived ones: `bristle_damping` sigma1 (N m s/rad), `damping_ratio` of
+            the sum, and `natural_frequency` (Hz).
+        fit, spread, misfit: basis of the estimates.
+        reason: common reason for no interval; `NONE` where each estimate has its own.
     """
 
     estimates: dict[str, Estimate]
@@ -85,7 +85,7 @@ class PreslidingDynamics:
 
     @property
     def plant(self) -> Plant:
-        """That fits best."""
+        """Plant of the best fit."""
         return self.fit.plant
 
 
@@ -94,9 +94,9 @@ def identify_presliding_dynamics(
 ) -> PreslidingDynamics:
     """Stiffness and damping of the bristles and inertia from all records at once.
 
-    An estimate is *not determined* where its interval is wide, or the parameter is at its bound;
-    none has an interval where one inertia on one bristle does not describe the records. Raises
-    ValueError with the reason where there is no fit at all.
+    An estimate is *not determined* where its interval is wide, or the parameter is at its bound.
+    No estimate has an interval where one inertia on one bristle does not describe the records.
+    Raises ValueError with the reason where there is no fit.
     """
     plain = fit_presliding_dynamics(records, assumed)
     fit = whitened(plain)
@@ -104,12 +104,12 @@ def identify_presliding_dynamics(
     spread = spread_of(fit)
     reason = _reason(fit, misfit)
     if reason:
-        found = {name: _without(fit, name, reason) for name in fit.parameters.names}
+        estimates = {name: _without(fit, name, reason) for name in fit.parameters.names}
     else:
         every = enumerate(fit.parameters.names)
-        found = {name: _estimate(fit, spread, misfit, index) for index, name in every}
-        found |= _derived(fit, spread, misfit)
-    return PreslidingDynamics(found, fit, spread, misfit, reason)
+        estimates = {name: _estimate(fit, spread, misfit, index) for index, name in every}
+        estimates |= _derived(fit, spread, misfit)
+    return PreslidingDynamics(estimates, fit, spread, misfit, reason)
 
 
 def _reason(fit: JointFit, misfit: Misfit) -> Reason:
@@ -131,22 +131,22 @@ def _without(fit: JointFit, name: str, reason: Reason) -> Estimate:
 
 
 def _estimate(fit: JointFit, spread: Spread, misfit: Misfit, index: int) -> Estimate:
-    """Of one shared parameter, with its limits along the profile where that is curved."""
+    """Estimate of one shared parameter, with limits along the profile where that is curved."""
     name = fit.parameters.names[index]
     value, scale = fit.parameters.in_units(fit.vector, name)
     freedom, deviation = float(spread.freedom[index]), float(spread.deviation[index])
     quantile = student(freedom)
     if name in LOGARITHMIC and quantile * deviation > WIDEST:
         return replace(_without(fit, name, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
-    ends = [float(fit.vector[index]) + way * quantile * deviation for way in (-1.0, 1.0)]
+    ends = [float(fit.vector[index]) + sign * quantile * deviation for sign in (-1.0, 1.0)]
     size = 1.0 if name in LOGARITHMIC else abs(float(fit.vector[index]))
     if name in PROFILED and CURVED * size < deviation < size:
         try:
-            ends = [profile_end(fit, spread, index, quantile, way) for way in (-1.0, 1.0)]
+            ends = [profile_end(fit, spread, index, quantile, sign) for sign in (-1.0, 1.0)]
         except ValueError:
             return replace(_without(fit, name, FLAT_PROFILE()), origin=Origin.NOT_DETERMINED)
     low, high = (_in_units(fit, name, end) for end in ends)
-    found = Estimate(
+    estimate = Estimate(
         name,
         value,
         UNITS[name],
@@ -157,13 +157,13 @@ def _estimate(fit: JointFit, spread: Spread, misfit: Misfit, index: int) -> Esti
         standard_error=deviation * scale,
         freedom=freedom if math.isfinite(freedom) else None,
     )
-    found = _missed(_shifted(found, float(misfit.shift[index]) * scale), misfit)
+    estimate = _missed(_shifted(estimate, float(misfit.shift[index]) * scale), misfit)
     if name in POSITIVE and low <= 0.0:
         where = "at or below nothing" if value <= 0.0 else "an interval that holds nothing"
         reason = TOO_LITTLE(where=where)
         origin = Origin.AT_BOUND if value <= 0.0 else Origin.NOT_DETERMINED
-        return replace(found, origin=origin, reason=reason)
-    return found if name.endswith("delay") or name == "yielding" else admitted(found)
+        return replace(estimate, origin=origin, reason=reason)
+    return estimate if name.endswith("delay") or name == "yielding" else admitted(estimate)
 
 
 def _in_units(fit: JointFit, name: str, at: float) -> float:
@@ -173,16 +173,16 @@ def _in_units(fit: JointFit, name: str, at: float) -> float:
 
 
 def _shifted(estimate: Estimate, shift: float) -> Estimate:
-    """With a part that is evenly likely up to what other shapes would change (GUM 4.3.7)."""
+    """Add a rectangular part with the shift by other shapes as half-width (GUM 4.3.7)."""
     if not shift:
         return estimate
     return shifted_by(estimate, "shape of the bristles' curve", abs(shift) / math.sqrt(3.0))
 
 
 def _missed(estimate: Estimate, misfit: Misfit) -> Estimate:
-    """With a part for what the model surely misses, though too little for a misfit.
+    """Add a part for a significant model error that is too small for a misfit.
 
-    An answer that is wrong by a share may have moved a number by as large a share.
+    A relative error of the answer may cause the same relative error of a number.
     """
     share = misfit.band_share
     if misfit.band_chance >= SURELY or not share or estimate.name in UNSCALED:
@@ -196,20 +196,20 @@ def _derived(fit: JointFit, spread: Spread, misfit: Misfit) -> dict[str, Estimat
     scale, ratio = fit.parameters.damping_scale, 0.5 / math.sqrt(plant.stiffness * plant.inertia)
     own, natural = plant.bristles[0].damping, plant.natural_frequency
     whole = own + plant.viscous
-    # Of stiffness and inertia the vector has logarithms.
+    # The vector contains the logarithms of stiffness and inertia.
     half = -0.5 * whole * ratio
     by_ratio = {"bristle_stiffness": half, "inertia": half, "damping": ratio * scale}
     by_natural = {"bristle_stiffness": 0.5 * natural, "inertia": -0.5 * natural}
-    told = (
+    rows = (
         ("bristle_damping", own, "N m s/rad", {"damping": scale, "viscous_friction": -scale}),
         ("damping_ratio", whole * ratio, "", by_ratio),
         ("natural_frequency", natural, "Hz", by_natural),
     )
-    found = {}
-    for name, value, unit, slopes in told:
+    derived = {}
+    for name, value, unit, slopes in rows:
         of = np.array([slopes.get(each, 0.0) for each in names])
         error = float(np.sqrt(of @ spread.covariance @ of))
         freedom = float(np.min(spread.freedom[of != 0.0], initial=np.inf))
         estimate = with_error(name, value, unit, error, freedom, METHOD)
-        found[name] = admitted(_missed(_shifted(estimate, float(of @ misfit.shift)), misfit))
-    return found
+        derived[name] = admitted(_missed(_shifted(estimate, float(of @ misfit.shift)), misfit))
+    return derived

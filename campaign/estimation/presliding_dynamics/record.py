@@ -10,31 +10,31 @@ from campaign.arrays import Array, Flags
 from campaign.estimation.presliding_dynamics.plant import Appendage
 
 FEWEST = 100
-"""Samples of a record below which it says too little of its own noise."""
+"""Fewest samples of a record for an estimate of its noise."""
 FEWEST_PER_PERIOD = 20
-"""Samples of a period below which its errors are too few to say how they scatter."""
+"""Fewest samples of a period for an estimate of the scatter of its errors."""
 ALIKE = 0.9
-"""Correlation with itself from which on a torque counts as one that repeats itself."""
+"""Autocorrelation above which a torque counts as periodic."""
 MOST = 0.999
-"""of the power of a torque: what lies beyond moves nothing."""
+"""Share of the power that determines the highest frequency; higher ones are negligible."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """Torque and answer of one trial, evenly sampled from its beginning on.
+    """Torque and motion of one trial, evenly sampled from its beginning on.
 
     Attributes:
         step: between samples (s).
         torque: at the load (N m), shape (n,).
-        rate: of the load, by a gyro (rad/s), shape (n,); NaN where a sample was lost; or None.
+        rate: of the load, by a gyro (rad/s), shape (n,); NaN for a missing sample; or None.
         angle: of the load, by an encoder (rad), shape (n,), likewise.
-        at_rest: whether it begins at rest, so that the bristles hold the first torque; else
-            bristles and rate at the beginning are free.
-        doubt: columns that the torque may be off by (N m), shape (n, m), each times a factor that
-            has a standard normal distribution and is the same in all records; None: it is known.
-        period: of the torque (s), where it repeats itself; None: that is looked for. A quantised
-            channel then errs alike in each period.
-        label: what to call it.
+        at_rest: whether it begins at rest, so that the bristles carry the first torque; otherwise
+            bristle torque and rate at the beginning are free.
+        doubt: columns of torque errors (N m), shape (n, m), each with a standard normal factor that
+            is common to all records; None: no error.
+        period: of the torque (s); None: detected. A quantized channel has the same errors in each
+            period.
+        label: name in messages.
     """
 
     step: float
@@ -63,22 +63,22 @@ class Record:
 
     @property
     def named(self) -> str:
-        """For messages."""
+        """Name in messages."""
         return self.label or "a record"
 
     @property
     def doubts(self) -> Array:
-        """`doubt`, or no column, shape (n, m)."""
+        """Columns of torque errors, possibly none, shape (n, m)."""
         return np.zeros((len(self.torque), 0)) if self.doubt is None else self.doubt
 
     def with_doubts(self, count: int) -> Record:
-        """Likewise, with columns of 0 up to that many."""
+        """Record with additional columns of 0, up to `count` columns."""
         more = np.zeros((len(self.torque), count - self.doubts.shape[1]))
         return replace(self, doubt=np.column_stack([self.doubts, more]))
 
     @property
     def time(self) -> Array:
-        """Of the samples (s), shape (n,)."""
+        """Times of the samples (s), shape (n,)."""
         return np.asarray(self.step * np.arange(len(self.torque)))
 
     @property
@@ -87,9 +87,9 @@ class Record:
         return float(np.max(np.abs(self.torque)))
 
     def highest_frequency(self) -> float:
-        """Frequency (Hz) below which `MOST` of the torque that the load answers to lies.
+        """Frequency (Hz) below which the share `MOST` of the effective torque lies.
 
-        Told by the product of both spectra: noise of one alone, however wide, does not count.
+        From the product of the spectra of torque and motion, which excludes noise of either.
         """
         answer = self.rate if self.rate is not None else np.gradient(np.asarray(self.angle))
         torque = np.fft.rfft(self.torque - np.mean(self.torque))
@@ -100,11 +100,11 @@ class Record:
         return float(np.fft.rfftfreq(len(self.torque), self.step)[min(index, len(power) - 1)])
 
     def samples_per_period(self) -> int | None:
-        """Of a torque that repeats itself at least twice; None of any other."""
+        """Samples per period of a torque with at least two periods; None for other torques."""
         count = len(self.torque)
         if self.period is not None:
-            found = round(self.period / self.step)
-            return found if FEWEST_PER_PERIOD <= found <= count // 2 else None
+            period = round(self.period / self.step)
+            return period if FEWEST_PER_PERIOD <= period <= count // 2 else None
         shape = self.torque - np.mean(self.torque)
         spectrum = np.fft.rfft(shape, 2 * count)
         alike = np.fft.irfft(np.abs(spectrum) ** 2)[: count // 2 + 1]
@@ -114,36 +114,36 @@ class Record:
         again = again[again > apart[0]] if len(apart) else again[:0]
         if not len(again):
             return None
-        # The first stretch of lags at which it is like itself again; its top.
+        # The maximum in the first range of lags with a large autocorrelation.
         breaks = np.flatnonzero(np.diff(again) > 1)
         first = again[: breaks[0] + 1] if len(breaks) else again
-        found = int(first[np.argmax(alike[first])])
-        return found if found >= FEWEST_PER_PERIOD else None
+        period = int(first[np.argmax(alike[first])])
+        return period if period >= FEWEST_PER_PERIOD else None
 
 
 def measured(record: Record) -> list[tuple[str, Array, Flags]]:
-    """The channels of a record: name, samples with 0 for lost ones, and which are there."""
-    found = []
+    """Channels of a record: name, samples with 0 for missing ones, mask of the valid ones."""
+    channels = []
     for name, values in (("rate", record.rate), ("angle", record.angle)):
         if values is not None:
-            there = np.isfinite(values)
-            found.append((name, np.where(there, values, 0.0), there))
-    return found
+            valid = np.isfinite(values)
+            channels.append((name, np.where(valid, values, 0.0), valid))
+    return channels
 
 
 def _says_something(values: Array) -> bool:
-    there = values[np.isfinite(values)]
-    return len(there) >= FEWEST and bool(np.ptp(there) > 0)
+    valid = values[np.isfinite(values)]
+    return len(valid) >= FEWEST and bool(np.ptp(valid) > 0)
 
 
 @dataclass(frozen=True)
 class Assumptions:
-    """What a fit begins with besides the records.
+    """Inputs of a fit besides the records.
 
     Attributes:
-        viscous: first guess of sigma2 (N m s/rad). Below breakaway sigma1 and sigma2 nearly add up,
-            so that the sum is known well and either seldom.
-        appendage: an elastic part, or a first guess of it.
+        viscous: start value of sigma2 (N m s/rad). Below breakaway almost only the sum of sigma1
+            and sigma2 has an effect, so that each alone is seldom determined.
+        appendage: an elastic part, or its start values.
         appendage_free: whether its frequency, inertia and damping are fitted, too.
     """
 

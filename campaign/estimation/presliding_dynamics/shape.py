@@ -1,11 +1,11 @@
-"""Whether one inertia on one bristle explains the records down to noise.
+"""Test whether one inertia on one bristle explains the records down to noise.
 
-Two questions are asked of the residuals, neither of which takes coloured noise for an error of the
-model. Are they a part of the simulated answer, band by band (an elastic part, a second inertia, a
-wrong delay)? And do they look like what other bristles would change: several interfaces that slip
-at different angles, a falling friction curve, springs that are not linear? These are score tests
-(Rao; White, Econometrica 50, 1982), with the covariance of autocorrelated scores; how far the
-parameters would move is the step to a model that has these terms.
+Two tests of the residuals, neither of which mistakes colored noise for a model error. The first
+compares them with the simulated answer, band by band (an elastic part, a second inertia, a wrong
+delay). The second compares them with the effect of other bristles: several interfaces that slip
+at different angles, a falling friction curve, nonlinear springs. Both are score tests (Rao; White,
+Econometrica 50, 1982), with the covariance of autocorrelated scores. The shift of the parameters
+is the step to a model that has these terms.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from campaign.estimation.presliding_dynamics.plant import Bristles
 from campaign.reason import NONE, Cause, Reason
 
 BANDS = 10
-"""into which the answer is cut, evenly over the logarithm of frequency."""
+"""Number of frequency bands of the answer, evenly spaced in the logarithm."""
 FAINT = 1e-3
-"""Share of the answer's power below and above which no band lies."""
+"""Share of the answer's power below the lowest and above the highest band."""
 SLIP_APART = 0.8
-"""How far the slip angles of the two halves of a bristle are set apart, either way."""
+"""Relative change of the slip angles of the two halves of a bristle, one up and one down."""
 PUSH = 0.02
-"""Size of a further force over the largest torque, for its influence to be told."""
+"""Scale of an additional force, for a finite difference of the answer."""
 SURELY = 1e-4
-"""Chance with which noise would look like an error of the model that is taken for one."""
+"""p value below which the residuals are a model error, not noise."""
 LIKELY = 0.01
-"""Chance below which what other shapes would change is a part of the uncertainty."""
+"""p value below which the shift by other shapes is a part of the uncertainty."""
 LARGE = 0.02
-"""Share of the answer that an error of the model may have before no number is given."""
+"""Share of the answer above which a model error prevents intervals."""
 NOISE = 2.0
-"""Times what noise explains by chance is taken off what columns explain: its own size is seldom
-known better."""
+"""Factor of the part explained by noise, subtracted from the part that columns explain: the noise
+level is seldom known better."""
 ALIKE = 1e-8
-"""Share of a column that must be its own, or it says nothing that the parameters do not."""
+"""Least share of a column that is independent of the parameters' columns."""
 
 SHAPES = (
     "interfaces that slip at different angles",
@@ -62,7 +62,7 @@ SHAPE_MISSED = Cause(
 
 @dataclass(frozen=True)
 class Band:
-    """What is left over in a band, over the simulated answer there: in phase, a quarter ahead."""
+    """Residual over simulated answer in a band: in phase (real), a quarter turn ahead (imag)."""
 
     frequency: float
     error: complex
@@ -70,16 +70,16 @@ class Band:
 
 @dataclass(frozen=True)
 class Misfit:
-    """What residuals have in common with the simulated answer and with other shapes.
+    """Results of both tests of the residuals.
 
     Attributes:
         bands: gain error by frequency.
-        band_share: rms of what the bands explain over that of the answer.
-        band_chance: with which noise explains the residuals as well.
-        shape_share, shape_chance: the same of other shapes of the bristles.
-        shape: the one of `SHAPES` that says most by itself.
-        shift: by which the shared parameters would move with other shapes, in the vector's units,
-            shape (k,); 0 where noise explains the residuals as well.
+        band_share: rms of the part explained by the bands over that of the answer.
+        band_chance: p value of noise as the only cause of that part.
+        shape_share, shape_chance: the same for other shapes of the bristles.
+        shape: the one of `SHAPES` that alone explains most.
+        shift: of the shared parameters with other shapes, in the vector's units, shape (k,); 0
+            where noise also explains the residuals.
     """
 
     bands: tuple[Band, ...]
@@ -92,7 +92,7 @@ class Misfit:
 
     @property
     def reason(self) -> Reason:
-        """Why no interval can be built on the fit; none: it can."""
+        """Reason why the fit has no intervals; `NONE` where it has."""
         if self.band_chance < SURELY and self.band_share > LARGE:
             worst = max(self.bands, key=lambda band: abs(band.error))
             return ANSWER_MISSED(share_percent=100 * self.band_share, frequency=worst.frequency)
@@ -102,18 +102,18 @@ class Misfit:
 
 
 def misfit_of(plain: JointFit, whitened: JointFit) -> Misfit:
-    """Ask the residuals of a fit both questions, as they are and whitened.
+    """Both tests on the residuals of a fit, plain and whitened.
 
-    How large an error of the model is, residuals say as they are: an autoregression would take much
-    of it for noise. Whether noise would look like it, only whitened ones say in short records.
+    Plain residuals determine the size of a model error: an autoregression would absorb much of it
+    as noise. The larger p value of both decides: short records need the whitened residuals.
     """
-    found, other = _misfit_of(plain), _misfit_of(whitened)
-    shape_chance = max(found.shape_chance, other.shape_chance)
+    misfit, other = _misfit_of(plain), _misfit_of(whitened)
+    shape_chance = max(misfit.shape_chance, other.shape_chance)
     return replace(
-        found,
-        band_chance=max(found.band_chance, other.band_chance),
+        misfit,
+        band_chance=max(misfit.band_chance, other.band_chance),
         shape_chance=shape_chance,
-        shift=found.shift * (shape_chance < LIKELY),
+        shift=misfit.shift * (shape_chance < LIKELY),
     )
 
 
@@ -122,12 +122,12 @@ def _misfit_of(fit: JointFit) -> Misfit:
     places, columns = _band_columns(fit)
     _, _, chance, explained = _score_test(fit, columns)
     left = sum(np.einsum("cn,cnk->k", r, c) for r, c in zip(fit.residuals, columns, strict=True))
-    there = sum(np.einsum("cnk,cnk->k", c, c) for c in columns)
-    pairs = (left / np.maximum(there, np.finfo(float).tiny)).reshape(-1, 2)
+    power = sum(np.einsum("cnk,cnk->k", c, c) for c in columns)
+    pairs = (left / np.maximum(power, np.finfo(float).tiny)).reshape(-1, 2)
     bands = tuple(Band(place, complex(*pair)) for place, pair in zip(places, pairs, strict=True))
-    found = _shape_columns(fit)
-    _, shift, shape_chance, shape_explained = _score_test(fit, found)
-    alone = [_score_test(fit, [each[:, :, [k]] for each in found])[3] for k in range(len(SHAPES))]
+    shapes = _shape_columns(fit)
+    _, shift, shape_chance, shape_explained = _score_test(fit, shapes)
+    alone = [_score_test(fit, [each[:, :, [k]] for each in shapes])[3] for k in range(len(SHAPES))]
     return Misfit(
         bands,
         float(np.sqrt(explained / size)),
@@ -142,13 +142,13 @@ def _misfit_of(fit: JointFit) -> Misfit:
 def _answers(fit: JointFit) -> list[Array]:
     """Simulated answers without offset and drift, in deviations, shape (channels, n)."""
     return [
-        np.array([c.left(told) for c, told in zip(group, fit.answers(number), strict=True)])
+        np.array([c.left(answer) for c, answer in zip(group, fit.answers(number), strict=True)])
         for number, group in enumerate(fit.channels)
     ]
 
 
 def _band_columns(fit: JointFit) -> tuple[list[float], list[Array]]:
-    """Middle of each band (Hz), and the answer in it, in phase and a quarter ahead."""
+    """Middle of each band (Hz), and the answer in it, in phase and a quarter turn ahead."""
     answers = _answers(fit)
     low, high = np.inf, 0.0
     for record, answer in zip(fit.records, answers, strict=True):
@@ -162,18 +162,18 @@ def _band_columns(fit: JointFit) -> tuple[list[float], list[Array]]:
     for record, answer in zip(fit.records, answers, strict=True):
         spectrum = np.fft.rfft(answer)
         frequency = np.fft.rfftfreq(answer.shape[1], record.step)
-        found = np.zeros((*answer.shape, 2 * BANDS))
+        parts = np.zeros((*answer.shape, 2 * BANDS))
         for index, (begin, end) in enumerate(itertools.pairwise(edges)):
             part = spectrum * ((frequency >= begin) & (frequency < end))
-            found[:, :, 2 * index] = np.fft.irfft(part, answer.shape[1])
-            found[:, :, 2 * index + 1] = np.fft.irfft(1j * part, answer.shape[1])
-        columns.append(found)
+            parts[:, :, 2 * index] = np.fft.irfft(part, answer.shape[1])
+            parts[:, :, 2 * index + 1] = np.fft.irfft(1j * part, answer.shape[1])
+        columns.append(parts)
     return [float(np.sqrt(a * b)) for a, b in itertools.pairwise(edges)], columns
 
 
 def _shape_columns(fit: JointFit) -> list[Array]:
-    """What each of `SHAPES` would change in the simulated answer, in deviations."""
-    plant, found = fit.plant, []
+    """Change of the simulated answer by each of `SHAPES`, in deviations."""
+    plant, changes = fit.plant, []
     bristles = plant.bristles[0]
     for number, group in enumerate(fit.channels):
         motion = fit.motion(number)
@@ -181,7 +181,7 @@ def _shape_columns(fit: JointFit) -> list[Array]:
         base = fit.answers(number)
         speed = float(np.sqrt(np.mean(rate**2)))
         falling = replace(bristles, coulomb_share=0.7, stribeck_velocity=speed)
-        # By the same force at every amplitude, or larger records would not say more.
+        # The same force at every amplitude: otherwise larger records would add no information.
         force, fastest = fit.parameters.torque, _fastest(fit)
         forces = (bent**3 / force**2, bent**2 / force, rate * np.abs(rate) * force / fastest**2)
         other = [
@@ -193,10 +193,10 @@ def _shape_columns(fit: JointFit) -> list[Array]:
             np.array([c.left(a - b) for c, a, b in zip(group, each, base, strict=True)])
             for each in other
         ]
-        # A shape that cannot be simulated says nothing.
+        # A shape that cannot be simulated has no effect.
         kept = [each if np.all(np.isfinite(each)) else np.zeros_like(each) for each in columns]
-        found.append(np.stack(kept, axis=-1))
-    return found
+        changes.append(np.stack(kept, axis=-1))
+    return changes
 
 
 def _fastest(fit: JointFit) -> float:
@@ -204,7 +204,7 @@ def _fastest(fit: JointFit) -> float:
 
 
 def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
-    """Two halves, of which one slips at a smaller angle and the other at a larger one."""
+    """Two halves of a bristle: one slips at a smaller angle, the other at a larger one."""
     return tuple(  # type: ignore[return-value]
         replace(
             bristles,
@@ -217,17 +217,17 @@ def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
 
 
 def _pushed(fit: JointFit, number: int, force: Array) -> Array:
-    """The answer with a further force on the load, of shape (steps + 1,)."""
+    """Answer with an additional force on the load, shape (steps + 1,)."""
     middle = 0.5 * (force[:-1] + force[1:])
     more = PUSH * np.column_stack([force[:-1], middle, force[1:]])
     return with_torque(fit, number, fit.grids[number].torque - more).answers(number)
 
 
 def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, float, float]:
-    """Step to a model with more columns: theirs, the parameters', its chance, sum explained
-    beyond what noise explains.
+    """Step to a model with additional columns: of the columns, of the parameters; its p value; sum
+    of squares explained beyond noise.
 
-    columns: of each record, shape (channels, n, k). Those without anything of their own are 0.
+    columns: of each record, shape (channels, n, k). The step of dependent columns is 0.
     """
     from scipy.special import chdtrc
 
@@ -247,12 +247,12 @@ def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, floa
         for slopes, more in zip(fit.jacobians, columns, strict=True)
     ]
     pairs = list(zip(fit.residuals, apart, strict=True))
-    # What is known beforehand is measured, too: residuals of their own.
+    # Prior values are measurements, too, with residuals of their own.
     known = fit.priors[:, None] * onto[:, kept]
     total = known.T @ (fit.priors * fit.vector)
     total = sum((np.einsum("cn,cnk->k", *pair) for pair in pairs), start=total)
     inverse = np.linalg.pinv(own[np.ix_(kept, kept)], rcond=1e-9, hermitian=True)
-    # What the columns explain is no noise: it would hide itself behind its own size.
+    # The explained part is no noise: included in the scores, it would hide itself.
     scores = [
         np.einsum("cn,cnk->nk", left - more @ (inverse @ total), more) for left, more in pairs
     ]

@@ -1,12 +1,12 @@
-"""The answer of a plant below breakaway to a sampled torque: an exponential integrator.
+"""Response of a plant below breakaway to a sampled torque: an exponential integrator.
 
-Below breakaway the equations are linear but for the yielding of the bristles, n = sigma0 |v| z / s.
-The linear part is advanced exactly, whatever its poles; torque and yielding enter as parabolas over
-each step (exponential collocation at the ends and the middle of a step, Hochbruck and Ostermann,
-Acta Numerica 19, 2010, section 2). Between samples the torque is a spline.
+Below breakaway the equations are linear except for the yielding of the bristles,
+n = sigma0 |v| z / s. The solution of the linear part is exact for any poles. Torque and yielding
+are parabolas over each step (exponential collocation at the ends and the middle of a step,
+Hochbruck and Ostermann, Acta Numerica 19, 2010, section 2). Between samples the torque is a spline.
 
 Checked against Radau at a tolerance of 1e-9: with the step of `steps_per_sample` the rate is within
-1e-4 of its largest value (tests/identification).
+1e-4 of its largest value (tests/estimation/test_presliding_dynamics.py).
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.physics.compilation import called, compiled
 
 FINEST = 0.25
-"""Largest step times the fastest frequency that matters (rad)."""
+"""Largest step times the fastest relevant frequency (rad)."""
 ORDER = 5
-"""Order of the spline through the torque: at 0.15 of the sampling rate a cubic one is off by 1e-3,
-and an inertia fitted with it by 4e-4."""
+"""Order of the spline through the torque: at 0.15 of the sampling rate the error of a cubic one is
+1e-3, and that of an inertia fitted with it 4e-4."""
 PASSES = 3
-"""Passes over the yielding in each step; its share of a step is small below breakaway."""
+"""Iterations of the yielding in each step, where it is small below breakaway."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,11 @@ class Motion:
     bristle_torque: Array
 
     def rate_at(self, delay: float) -> Array:
-        """The rate of `delay` (s) before each sample, shape (n,): cubic Hermite."""
+        """Rate at `delay` (s) before each sample, shape (n,): cubic Hermite."""
         return self._at(self.rate, self.acceleration, delay)
 
     def angle_at(self, delay: float) -> Array:
-        """The angle of `delay` (s) before each sample, shape (n,)."""
+        """Angle at `delay` (s) before each sample, shape (n,)."""
         return self._at(self.angle, self.rate, delay)
 
     def _at(self, values: Array, slopes: Array, delay: float) -> Array:
@@ -62,7 +62,7 @@ class Motion:
         place = np.clip(place, 0.0, len(values) - 1.0)
         left = np.minimum(place.astype(np.intp), len(values) - 2)
         x = place - left
-        with np.errstate(invalid="ignore", over="ignore"):  # of a motion that diverged
+        with np.errstate(invalid="ignore", over="ignore"):  # for a diverged motion
             rise = values[left + 1] - values[left]
             m0, m1 = slopes[left] * self.step, slopes[left + 1] * self.step
             turned = (1.0 - x) * x * ((1.0 - x) * (m0 - rise) - x * (m1 - rise))
@@ -76,7 +76,7 @@ def steps_per_sample(plant: Plant, sample_step: float, highest: float) -> int:
 
 
 def torque_on_grid(torque: Array, per_sample: int) -> Array:
-    """Torque at every half grid step, shape (steps, 3): beginning, middle and end of each."""
+    """Torque at beginning, middle and end of each grid step, shape (steps, 3)."""
     from scipy.interpolate import make_interp_spline
 
     steps = (len(torque) - 1) * per_sample
@@ -94,11 +94,11 @@ def simulate(
     bristle_torque: Array | float | None = None,
     rate: float = 0.0,
 ) -> Motion:
-    """The motion for `torque` of `torque_on_grid` (N m), shape (steps, 3), from angle 0.
+    """Motion for `torque` of `torque_on_grid` (N m), shape (steps, 3), from angle 0.
 
-    bristle_torque: sigma0 z of each interface at the beginning (N m); one number is shared out by
-    stiffness; None: what holds the first torque. rate: at the beginning (rad/s). Samples of what
-    diverges are infinite or NaN.
+    bristle_torque: sigma0 z of each interface at the beginning (N m); one number: their sum, in
+    proportion to stiffness; None: equal to the first torque. rate: at the beginning (rad/s).
+    Samples of a diverged motion are infinite or NaN.
     """
     system = _System.of(plant)
     step = sample_step / per_sample
@@ -121,7 +121,7 @@ def simulate(
     )  # fmt: skip
     _run(table, state, torque, half, to_middle, whole, to_end, states, yields)
     applied = np.append(torque[:, 0], torque[-1, 2])
-    with np.errstate(over="ignore", invalid="ignore"):  # of what diverges
+    with np.errstate(over="ignore", invalid="ignore"):  # for a diverged motion
         acceleration = states @ system.linear[1] + system.inputs[1, 0] * applied
         acceleration += yields @ system.inputs[1, 1:]
     return Motion(
@@ -172,9 +172,9 @@ class _System:
         return cls(linear, inputs)
 
     def held(self, until: float, step: float) -> tuple[Array, Array]:
-        """Transition over `until`, shape (m, m), and what the inputs add by then, (3, m, 1 + n).
+        """Transition over `until`, shape (m, m), and effect of the inputs, (3, m, 1 + n).
 
-        The inputs are parabolas, told by their values at 0, step / 2 and step.
+        The inputs are parabolas through their values at 0, step / 2 and step.
         """
         from scipy.linalg import expm
 
@@ -182,15 +182,15 @@ class _System:
         chain = np.zeros((m + 3 * k, m + 3 * k))  # the inputs as states: 1, t, t^2 / 2
         chain[:m, :m], chain[:m, m : m + k] = self.linear, self.inputs
         chain[m : m + 2 * k, m + k :] = np.eye(2 * k)
-        found = expm(chain * until)
-        one, linear, square = (found[:m, m + i * k : m + (i + 1) * k] / step**i for i in range(3))
+        whole = expm(chain * until)
+        one, linear, square = (whole[:m, m + i * k : m + (i + 1) * k] / step**i for i in range(3))
         square = 2.0 * square
         nodes = (
             one - 3.0 * linear + 2.0 * square,
             4.0 * (linear - square),
             2.0 * square - linear,
         )
-        return np.ascontiguousarray(found[:m, :m]), np.ascontiguousarray(nodes)
+        return np.ascontiguousarray(whole[:m, :m]), np.ascontiguousarray(nodes)
 
 
 @compiled
@@ -205,11 +205,11 @@ def _run(
     states: Array,
     yields: Array,
 ) -> None:
-    """Advance `state` through all steps; `states` and `yields` are filled in.
+    """Advance `state` through all steps and fill `states` and `yields`.
 
     table: per interface sigma0 / Ts, Tc / Ts, 1 / vs and delta, shape (k, 4); half, whole:
-    transitions (m, m); to_middle, to_end: what inputs at the beginning, middle and end of a step
-    add, shape (3, m, 1 + k).
+    transitions (m, m); to_middle, to_end: effect of the inputs at the beginning, middle and end of
+    a step, shape (3, m, 1 + k).
     """
     size, count = len(state), len(table)
     begin, middle, end = np.empty(count), np.empty(count), np.empty(count)
@@ -246,7 +246,7 @@ def _run(
 def _freely(
     held: Array, inputs: Array, state: Array, torque: Array, begin: Array, found: Array
 ) -> None:
-    """Where torque and the yielding at the beginning of a step alone lead; `found` is filled in."""
+    """Fill `found` with the state by torque and the yielding at the beginning of a step alone."""
     for r in range(len(state)):
         total = 0.0
         for c in range(len(state)):

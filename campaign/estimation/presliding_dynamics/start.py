@@ -13,43 +13,43 @@ from campaign.estimation.presliding_dynamics.plant import Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
 
 GROUPS = 60
-"""of neighbouring frequencies, evenly over their logarithm: within one, noise averages out."""
+"""Groups of neighboring frequencies, even in the logarithm; the sums in a group reduce noise."""
 FAINT = 5e-4
-"""Share of the torque's power below and above which no group lies."""
+"""Share of the torque's power below the lowest and above the highest group."""
 PASSES = 6
-"""of the weighted regression; the weights follow from the plant of the one before."""
+"""Iterations of the weighted regression; the weights follow from the previous plant."""
 
 
 def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
-    """A plant without yielding, by T = (J jw + d + sigma0 / jw) V at the excited frequencies.
+    """Start plant from a fit of T = (J jw + d + sigma0 / jw) V at the excited frequencies.
 
-    Both sides are correlated with the torque, so that noise of the rate biases nothing; weights as
-    Sanathanan and Koerner have them (IEEE Trans. Autom. Control 8, 1963). Raises ValueError where
-    the records show no stiffness.
+    The fit excludes yielding. Both sides are correlated with the torque, so that noise of the rate
+    causes no bias; weights after Sanathanan and Koerner (IEEE Trans. Autom. Control 8, 1963).
+    Raises ValueError where the records show no stiffness.
     """
     parts = [group for record in records for group in _groups(record)]
     rows = np.array([row for row, _, _ in parts])
     power = np.array([each for _, each, _ in parts])
     highest = max(omega for _, _, omega in parts)
-    # Of each group the plant's dynamic stiffness over the rate, at first as measured.
+    # Dynamic stiffness over the rate in each group, first as measured.
     plant = power / np.maximum(np.abs(rows[:, 1]), np.finfo(float).tiny)
-    found = np.zeros(3)
+    fit = np.zeros(3)
     for _ in range(PASSES):
         weight = 1.0 / (plant * np.sqrt(power))
         design, aim = rows * weight[:, None], power * weight
         scale = np.linalg.norm(design, axis=0)
         whole = np.concatenate([design.real, design.imag]) / scale
         sides = np.concatenate([np.real(aim), np.imag(aim)])
-        found = np.linalg.lstsq(whole, sides, rcond=None)[0] / scale
+        fit = np.linalg.lstsq(whole, sides, rcond=None)[0] / scale
         omega = np.array([each for _, _, each in parts])
-        plant = np.abs(found[0] * 1j * omega + found[1] + found[2] / (1j * omega))
+        plant = np.abs(fit[0] * 1j * omega + fit[1] + fit[2] / (1j * omega))
         plant = np.maximum(plant, 1e-6 * np.max(plant))
-    inertia, damping, stiffness = map(float, found)
+    inertia, damping, stiffness = map(float, fit)
     if not stiffness > 0:
         raise ValueError("the motion shows no stiffness: it does not come back to where it was")
     part = assumed.appendage
     if not inertia > (part.inertia if part else 0.0):
-        # Nothing at high frequencies: as large as it may be without showing.
+        # No effect at high frequencies: the largest inertia without an effect.
         inertia = max(stiffness / (4.0 * highest) ** 2, 2.0 * part.inertia if part else 0.0)
     least = 0.02 * 2.0 * np.sqrt(stiffness * inertia)
     compliance = 0.3 / max(record.amplitude for record in records)
@@ -58,7 +58,7 @@ def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
 
 
 def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
-    """Of each group: sums of (jw V, V, V / jw) T*, the sum of T T*, middle frequency (rad/s)."""
+    """For each group: sums of (jw V, V, V / jw) T*, the sum of T T*, middle frequency (rad/s)."""
     window = np.hanning(len(record.torque))
     channels = {name: values for name, values, _ in measured(record)}
     frequency = np.fft.rfftfreq(len(window), record.step)

@@ -1,8 +1,8 @@
 """Uncertainty of the parameters of a joint fit.
 
-Two covariances are compared: one from the autocorrelated scores of all samples, and one from how
-the records differ from each other, which is larger where friction changed between them. The
-larger one counts where they differ by more than chance explains.
+There are two covariances: one from the autocorrelated scores of all samples, and one from the
+differences between records, which is larger where friction changed between them. The second one
+applies where it is significantly larger.
 """
 
 from __future__ import annotations
@@ -19,14 +19,13 @@ from campaign.estimation.presliding_dynamics.fit import search
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
 
 CHANCE = 0.01
-"""with which records that agree would be taken for ones that do not."""
+"""Probability of a false detection of differences between records."""
 CURVED = 0.03
-"""Relative standard error from which on a limit is looked for along the profile."""
+"""Relative standard error above which a limit is calculated along the profile."""
 ACCURACY, DOUBLINGS = 0.01, 4
-"""of such a limit, as a share of it; and how often the distance to it is doubled: each step is a
-fit."""
+"""Relative accuracy of such a limit; most doublings of the distance to it. Each step is a fit."""
 TELLABLE = 1e10
-"""Condition number of the scaled information beyond which parameters cannot be told apart."""
+"""Condition number of the scaled information above which the parameters are not separable."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +34,10 @@ class Spread:
 
     Attributes:
         covariance: shape (k, k).
-        freedom: degrees of freedom behind each deviation, shape (k,); infinite for scores.
+        freedom: degrees of freedom of each deviation, shape (k,); infinite for scores.
         ordinary: deviations for independent residuals, shape (k,).
         by_bandwidth: deviations at half, once and twice the bandwidth, shape (3, k).
-        between: deviation by how records differ over that by scores, shape (k,); NaN for one.
+        between: deviation between records over that by scores, shape (k,); NaN for one record.
         condition: condition number of the information, with columns of length 1.
     """
 
@@ -51,19 +50,19 @@ class Spread:
 
     @property
     def deviation(self) -> Array:
-        """Of each shared parameter, shape (k,)."""
+        """Standard deviation of each shared parameter, shape (k,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def correlation(self) -> Array:
-        """Shape (k, k)."""
+        """Correlation of the shared parameters, shape (k, k)."""
         return np.asarray(self.covariance / np.outer(self.deviation, self.deviation))
 
 
 def spread_of(fit: JointFit) -> Spread:
     """Covariance of the shared parameters of a fit.
 
-    Raises ValueError where the records cannot tell the parameters apart.
+    Raises ValueError where the records do not separate the parameters.
     """
     shared = len(fit.parameters.names)
     information = fit.information
@@ -82,7 +81,7 @@ def spread_of(fit: JointFit) -> Spread:
     count = sum(float(np.sum(c.there)) for group in fit.channels for c in group)
     variance = fit.cost / max(count - fit.parameters.size, 1.0)
     ordinary = np.sqrt(variance * np.diag(inverse))[:shared]
-    # What is known beforehand is known no better than it was said to be.
+    # Priors have exactly their stated uncertainty.
     known = np.diag(fit.priors**2)
 
     def covariance_at(terms: Sequence[Array], lags: float) -> Array:
@@ -91,12 +90,12 @@ def spread_of(fit: JointFit) -> Spread:
 
     covariances = [covariance_at(scores, lags) for lags in bandwidths(scores)]
     widths = np.sqrt([np.diag(each) for each in covariances])
-    # A quantised channel errs alike in each period of the torque: no period scatters then.
+    # A quantized channel has the same errors in each period of the torque, without scatter.
     folded = [
         _folded(each, r.samples_per_period()) for each, r in zip(scores, fit.records, strict=True)
     ]
     repeated = np.sqrt(np.diag(covariance_at(folded, bandwidths(folded)[1])))
-    # Residuals that avoid their neighbours promise more than they can be trusted to keep.
+    # Negatively correlated residuals would result in too small deviations.
     chosen = np.maximum.reduce([safe_deviations(widths), repeated, ordinary])
     covariance = scaled_to(covariances[1], chosen)
     freedom, between = np.full(shared, np.inf), np.full(shared, np.nan)
@@ -119,8 +118,8 @@ def _with_records(
 ) -> tuple[Array, Array, Array]:
     """Covariance, degrees of freedom, and ratio of the deviations between records to those within.
 
-    Each record's score, without what its own parameters take, shows where it would have the shared
-    ones (Liang and Zeger, Biometrika 73, 1986).
+    The score of each record, reduced by its own parameters, shows its deviation from the shared
+    parameters (Liang and Zeger, Biometrika 73, 1986).
     """
     from scipy.special import chdtri
 
@@ -145,17 +144,17 @@ def _with_records(
 
 
 def profile_end(fit: JointFit, spread: Spread, index: int, quantile: float, way: float) -> float:
-    """Where the profile of a shared parameter has risen by `quantile` deviations, to one side.
+    """Limit of a shared parameter at `quantile` deviations of its profile; `way`: -1 or 1.
 
-    The sum of squares counts in units of the parameter's own variance, so that autocorrelated
-    residuals are allowed for. Raises ValueError where the profile never rises so far.
+    The sum of squares is in units of the parameter's own variance, which includes the effect of
+    autocorrelated residuals. Raises ValueError where the profile has no limit.
     """
     sigma = float(spread.deviation[index])
     # Rise of the profiled sum of squares over the square of a small distance.
     curvature = 1.0 / float(np.linalg.inv(fit.information)[index, index])
 
     def squared_rise(distance: float) -> float:
-        """By which the profile has risen at a distance, both in `sigma`."""
+        """Squared rise of the profile at a distance, both in `sigma`."""
         if distance == 0.0:
             return 0.0
         held = _held(fit, index, way * distance * sigma)
@@ -166,7 +165,7 @@ def profile_end(fit: JointFit, spread: Spread, index: int, quantile: float, way:
 
 
 def _held(fit: JointFit, index: int, distance: float) -> JointFit:
-    """The fit with one parameter held so far away, the others as good as they get."""
+    """Fit with one parameter fixed at a distance and the others optimized."""
     column = np.linalg.inv(fit.information)[:, index]
     vector = np.clip(fit.vector + distance * column / column[index], *fit.parameters.bounds())
     vector[index] = fit.vector[index] + distance

@@ -1,10 +1,10 @@
 """Drift and jumps of a number from the same points.
 
-A trend is a line over time, over temperature, or over whatever runs differ in. A jump is one level
-before, another behind. Each is judged with what runs scatter besides and with what neighbouring
-runs know of each other (`scatter`). A jump's place is looked for: its p value is the smallest of
-all places times how many there are (Bonferroni), which holds whatever the places have to do with
-each other. Source of the splitting: Vostrikova, Soviet Mathematics Doklady 24 (1981).
+A trend is a line over time, temperature, or another quantity in which runs differ. A jump is a
+change from one level to another. Both tests include the scatter between runs and the correlation
+of neighboring runs (`scatter`). The place of a jump is searched: its p value is the smallest of
+all places times their number (Bonferroni), which is valid for any dependence between places.
+Source of the splitting: Vostrikova, Soviet Mathematics Doklady 24 (1981).
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from campaign.arrays import Array
 from campaign.estimation.trends.scatter import Fits, Mixture, fits
 
 LEAST_FOR_A_JUMP = 5
-"""With fewer, no place has a second point on both sides that shows how runs scatter."""
+"""Fewest points for a jump: two levels leave three of them to estimate the scatter of runs."""
 ON_EACH_SIDE = 2
-"""Fewest points on a side of a jump: one alone is an outlier as well."""
+"""Fewest points on a side of a jump: a single point can also be an outlier."""
 CLEARLY = math.log(3.0)
-"""Ratio of integrated likelihoods from which on one of two shapes is said to fit better."""
+"""Logarithm of the ratio of integrated likelihoods above which one shape fits clearly better."""
 HELD = 0.95
 """Probability of the models that are kept."""
 POWER = 0.8
-"""How often a change of the detectable size would be declared."""
+"""Probability with which a change of the detectable size is declared."""
 PICKED = 1e-3
-"""Least share of the weight with which a place counts in the size of a jump."""
+"""Least weight of a place that counts in the size of a jump."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class Trend:
 
     Attributes:
         slope: b.
-        p: two-sided, of b = 0.
-        scatter: typical standard deviation of runs besides their own errors.
-        correlation: of neighbouring runs, as far as the points say.
+        p: two-sided p value of b = 0.
+        scatter: typical standard deviation between runs, without their own errors.
+        correlation: of neighboring runs, as estimated from the points.
     """
 
     slope: Mixture
@@ -50,23 +50,23 @@ class Trend:
     fits: Fits
 
     def at(self, x: float) -> Mixture:
-        """The line's value."""
+        """Value of the line."""
         return self.fits.line(x)
 
 
 @dataclass(frozen=True)
 class Jump:
-    """One level before a place, another from there on.
+    """Change of level at one place.
 
     Attributes:
-        place: index of the first point behind the jump, the likeliest.
-        between: first and last place that 95 % of the weight leave.
-        size: after less before, averaged over the places that may be meant; the jump was looked
-            for, so that one that is only just declared tends to look larger than it is.
-        p: of no jump anywhere.
-        places: how many were tried.
+        place: index of the first point after the jump, at its most likely place.
+        between: first and last of the places that have 95 % of the weight.
+        size: after less before, averaged over the likely places. Because the jump is searched,
+            the size of a barely significant jump tends to be too large.
+        p: p value of no jump at any place.
+        places: number of places tried.
         before, after: the two levels at `place`.
-        clearest: of the place where a jump would be best known, for what would have been seen.
+        clearest: size at the place with the smallest uncertainty, for the detectable size.
     """
 
     place: int
@@ -81,12 +81,12 @@ class Jump:
 
 @dataclass(frozen=True)
 class Change:
-    """Both shapes of one series.
+    """Trend and jump of one series.
 
     Attributes:
-        trend: None where there is nothing to follow along.
-        jump: None of fewer than five points.
-        shape: `line` or `jump`, which of the two the points clearly prefer; "" for neither.
+        trend: None without an x.
+        jump: None for fewer than five points.
+        shape: `line` or `jump`, the shape that fits clearly better; "" for neither.
     """
 
     trend: Trend | None
@@ -98,11 +98,11 @@ def change(x: Array | None, values: Array, own: Array, *, jumps: bool = True) ->
     """Trend and jump of a series.
 
     Args:
-        x: what is followed, shape (n,), in any unit; None where only jumps are asked for.
-        values: shape (n,), in the order in which they were measured.
-        own: covariance of the values' own errors, shape (n, n); zeros where nobody knows them, and
-            the scatter between runs is all that there is. What shifts all alike is no part of it.
-        jumps: whether the order is one in which something can jump.
+        x: abscissa of the trend, shape (n,), in any unit; None for jumps only.
+        values: shape (n,), in the order of measurement.
+        own: covariance of the values' own errors, shape (n, n); zeros where they are unknown, and
+            only the scatter between runs remains. Errors common to all values are not included.
+        jumps: whether to test for jumps, which need a meaningful order.
 
     Raises ValueError for fewer than three points, for values that do not differ, and where x does
     not vary.
@@ -112,38 +112,38 @@ def change(x: Array | None, values: Array, own: Array, *, jumps: bool = True) ->
     lines = np.empty((n, 0)) if x is None else np.asarray(x, dtype=float)[:, None]
     if lines.shape[1] + steps.shape[1] == 0:
         raise ValueError(f"{n} points are too few for a jump; {LEAST_FOR_A_JUMP} are the least")
-    found = fits(values, np.hstack([lines, steps]), own)
+    models = fits(values, np.hstack([lines, steps]), own)
     first = lines.shape[1]
-    trend = _trend(found) if first else None
-    jump = _jump(found, first) if steps.shape[1] else None
-    shape = _shape(found.evidence) if trend is not None and jump is not None else ""
+    trend = _trend(models) if first else None
+    jump = _jump(models, first) if steps.shape[1] else None
+    shape = _shape(models.evidence) if trend is not None and jump is not None else ""
     return Change(trend, jump, shape)
 
 
 def steps_of(n: int) -> Array:
-    """Every place of a jump as a column, shape (n, n - 3): 0 before it, 1 from there on."""
+    """One column for each place of a jump, shape (n, n - 3): 0 before the jump, 1 after it."""
     places = np.arange(ON_EACH_SIDE, n - ON_EACH_SIDE + 1)
     return (np.arange(n)[:, None] >= places).astype(float)
 
 
 def jumps_of(values: Array, own: Array, level: float) -> tuple[Jump, ...]:
-    """All jumps, in order: each half is searched again until nothing more is found.
+    """All jumps, in order: each part is split again until no significant jump remains.
 
-    Args: as for `change`; `level` is the p value at which a jump is declared. Halves share it, so
-    that one false jump more has that probability at most at each depth. Two jumps that cancel, up
-    and soon down again, may both be overlooked. Size and place are those between the neighbouring
-    jumps: a search in the whole of them saw these as well.
+    Args: as for `change`; `level` is the p value at which a jump is declared. The two parts share
+    it, so that the probability of a further false jump is at most `level` at each depth. Two jumps
+    that cancel, up and soon down again, may both stay undetected. Size and place are estimated
+    between the neighboring jumps, because a search over all points includes these jumps.
     """
-    found = sorted(_split(values, own, level, 0), key=lambda jump: jump.place)
-    ends = [0, *(jump.place for jump in found), len(values)]
+    jumps = sorted(_split(values, own, level, 0), key=lambda jump: jump.place)
+    ends = [0, *(jump.place for jump in jumps), len(values)]
     return tuple(
         _within(values, own, jump, first, stop)
-        for jump, first, stop in zip(found, ends, ends[2:], strict=False)
+        for jump, first, stop in zip(jumps, ends, ends[2:], strict=False)
     )
 
 
 def _within(values: Array, own: Array, jump: Jump, first: int, stop: int) -> Jump:
-    """The same jump seen from its own stretch, where that is long enough."""
+    """The same jump, estimated from its own segment where that is long enough."""
     if stop - first < LEAST_FOR_A_JUMP:
         return jump
     again = change(None, values[first:stop], own[first:stop, first:stop]).jump
@@ -196,7 +196,7 @@ def _jump(found: Fits, first: int) -> Jump:
 
 
 def _shape(evidence: Array) -> str:
-    """Line against a jump at any place, each place as likely as the next."""
+    """Shape that fits better: line, or jump at any of the equally likely places."""
     steps = evidence[1:]
     top = float(np.max(steps))
     anywhere = top + math.log(float(np.mean(np.exp(steps - top))))
@@ -205,10 +205,10 @@ def _shape(evidence: Array) -> str:
 
 
 def detectable(known: Mixture, level: float) -> float:
-    """Smallest size that would be declared at `level` with a probability of `POWER`.
+    """Smallest size that is declared at `level` with a probability of `POWER`.
 
-    known: what the points leave open of the number; its centre does not matter. The scatter that
-        was found is taken as what it would have been with such a change, too.
+    known: estimate of the number, of which only the width matters. The estimated scatter is
+        assumed to be the same with such a change.
     """
     from scipy.special import ndtri
 

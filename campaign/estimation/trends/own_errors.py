@@ -1,9 +1,9 @@
 """Errors of single points with few repeats.
 
-A deviation from three repeats is itself known to a third only. Points of one kind are about equally
-well known: each one's variance is drawn towards what all of them have in common, by as much as they
-say that they have it in common (Smyth, Statistical Applications in Genetics and Molecular Biology
-3, 2004, sections 3 and 6.2).
+A deviation from three repeats has itself an error of a third. Points of one kind have similar
+errors. Therefore each variance is shrunk towards the common one, by the degree to which the
+variances agree (Smyth, Statistical Applications in Genetics and Molecular Biology 3, 2004,
+sections 3 and 6.2).
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from campaign.arrays import Array
 from campaign.estimation.intervals import student
 
 MANY = 1e4
-"""Degrees of freedom that are as good as infinitely many."""
+"""Degrees of freedom that stand for infinitely many."""
 
 
 def moderated(errors: Array, freedom: Array) -> Array:
-    """Standard deviations for points with standard errors, shape (n,) each.
+    """Moderated standard deviations of points, from standard errors; shape (n,) each.
 
     Args:
         errors: standard error of each point, positive.
-        freedom: degrees of freedom of each; infinite where it is known.
+        freedom: degrees of freedom of each; infinite for an exact error.
 
-    Returns: (n,), widened as Student's t is where few degrees of freedom are left after all.
+    Returns: shape (n,), widened as Student's t for the remaining degrees of freedom.
     """
     from scipy.special import digamma, polygamma
 
@@ -43,7 +43,7 @@ def moderated(errors: Array, freedom: Array) -> Array:
 
 
 def _inverse_trigamma(value: float) -> float:
-    """Twice the x whose trigamma is `value`; infinite for none."""
+    """Twice the x with the trigamma `value`; infinite where that is too small."""
     from scipy.optimize import brentq
     from scipy.special import polygamma
 

@@ -1,22 +1,22 @@
 """Regression on few points with excess scatter and autocorrelation.
 
 The model is y = X b + own + between. `own` has the known covariance of the points' intervals.
-`between` is what runs scatter besides: a first-order autoregression in the order of the points,
-with standard deviation tau and correlation rho of neighbours, both unknown. With few points neither
-can be estimated and then taken as known: intervals would be too narrow by far. So they are
-integrated over. For each tau and rho, b is normal (generalised least squares); what is said of b is
-the mixture of those normals, weighted by the restricted likelihood (Harville, Journal of the
-American Statistical Association 72, 1977) times
+`between` is the scatter between runs: a first-order autoregression in the order of the points, with
+standard deviation tau and correlation rho of neighbors, both unknown. With few points, intervals
+for estimated values of tau and rho would be much too narrow. Therefore both are integrated out. For
+each tau and rho, b is normal (generalized least squares); the result is the mixture of these
+normals, weighted by the restricted likelihood (Harville, Journal of the American Statistical
+Association 72, 1977) times three priors:
 
-- 1 / (s + tau), s being the typical own error: the reference prior 1 / tau where the points' own
-  errors are of no weight, so that independent points without own errors have exactly Student's t;
-  nearly flat below s, as Gelman (Bayesian Analysis 1, 2006) advises for a variance that may be 0;
-- for the points' own errors, even chances that they are as large as stated, or that they are
-  `LEAST_OWN` of that or more (flat in the logarithm): what intervals have in common, such as one
-  model's misfit, is in each of them and in no difference, and then points scatter by far less than
-  their intervals are wide;
-- a flat one for rho from 0 to `MOST_RHO`: with few points, which say nothing of rho, intervals hold
-  on average over it. A negative rho makes slopes better known, not worse, and is left out.
+- 1 / (s + tau), with the typical own error s: the reference prior 1 / tau where own errors are
+  negligible, so that independent points without own errors have exactly Student's t; almost flat
+  below s, as Gelman (Bayesian Analysis 1, 2006) recommends for a variance that may be 0;
+- for the own errors, a probability of 1/2 that they are as stated, and of 1/2 that they are between
+  `LEAST_OWN` of that and that (flat in the logarithm): an error common to all intervals, such as a
+  misfit of the model, cancels in differences, and then points scatter much less than their
+  intervals;
+- flat for rho from 0 to `MOST_RHO`: few points do not determine rho, and intervals are valid on
+  average over it. A negative rho, which reduces the error of slopes, is excluded.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ from numpy.typing import NDArray
 from campaign.arrays import Array
 
 MOST_RHO = 0.9
-"""Largest correlation of neighbouring runs that is allowed for."""
+"""Largest correlation of neighboring runs in the prior."""
 LEAST_OWN = 0.02
 """Least share of the stated own errors that may be independent."""
 OWNS = 6
-"""Nodes in that share; half of the weight is on all of it."""
+"""Nodes in that share; the share 1 has half of the weight."""
 RHOS = 12
-"""Nodes (Gauss and Legendre) in the correlation."""
+"""Nodes (Gauss-Legendre) in the correlation."""
 COARSE, FINE = 8, 60
-"""Nodes in tau: per decade when its range is looked for, and within the range."""
+"""Nodes in tau: per decade in the search of its range, and within the range."""
 NEGLIGIBLE = 18.0
-"""How far below the largest the logarithm of a weight may lie and still count."""
+"""Distance of the logarithm of a weight from the largest, beyond which it is not used."""
 FLOOR = 1e-7
-"""Own error of a point, as a share of the scatter, where it has none: matrices stay regular."""
+"""Least own error of a point, as a share of the scatter, so that matrices stay regular."""
 WIDEST = 1e3
-"""Largest tau that is tried, in standard deviations of the values."""
+"""Largest tau, in standard deviations of the values."""
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """What is known of one number: normals with weights.
+    """Distribution of one number: a weighted mixture of normals.
 
     Attributes:
         weight: shape (g,), sum 1.
@@ -64,23 +64,23 @@ class Mixture:
 
     @classmethod
     def of(cls, log_weight: Array, mean: Array, deviation: Array) -> Self:
-        """From logarithms of weights, without those that do not count."""
+        """Mixture from logarithms of weights, without negligible ones."""
         kept = log_weight > np.max(log_weight) - NEGLIGIBLE
         return cls(_weights(log_weight[kept]), mean[kept], deviation[kept])
 
     @property
     def value(self) -> float:
-        """The median."""
+        """Median."""
         return self.quantile(0.5)
 
     def below(self, number: float) -> float:
-        """Share that lies below a number."""
+        """Probability of a value below a number."""
         from scipy.special import ndtr
 
         return float(self.weight @ ndtr((number - self.mean) / self.deviation))
 
     def quantile(self, share: float) -> float:
-        """The number below which this share lies."""
+        """Quantile of the probability `share`."""
         from scipy.optimize import brentq
         from scipy.special import ndtri
 
@@ -99,12 +99,12 @@ class Mixture:
         )
 
     def interval(self, level: float) -> tuple[float, float]:
-        """Equal tails."""
+        """Interval with equal tails."""
         return self.quantile(0.5 - 0.5 * level), self.quantile(0.5 + 0.5 * level)
 
     @property
     def p(self) -> float:
-        """Two-sided, of 0: twice the smaller tail, so that it is below 5 % where 95 % exclude 0."""
+        """Two-sided p value of 0: twice the smaller tail; below 5 % where 95 % exclude 0."""
         from scipy.special import ndtr
 
         scaled = self.mean / self.deviation
@@ -114,13 +114,13 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Fits:
-    """One number of each of m models y = a + b x, over nodes of tau and rho.
+    """Slopes of m models y = a + b x, over nodes of tau and rho.
 
     Attributes:
         log_weight: logarithm of restricted likelihood times prior times step, shape (g, m).
         value, deviation: of b, shape (g, m).
-        pivot: the x at which y is known independently of b, shape (g, m).
-        level, level_deviation: of y there, shape (g,).
+        pivot: the x at which y is independent of b, shape (g, m).
+        level, level_deviation: of y at the pivot, shape (g,).
         tau, rho: of the nodes, shape (g,).
     """
 
@@ -134,11 +134,11 @@ class Fits:
     rho: Array
 
     def mixture(self, model: int = 0) -> Mixture:
-        """Of one model."""
+        """Slope of one model."""
         return Mixture.of(self.log_weight[:, model], self.value[:, model], self.deviation[:, model])
 
     def line(self, x: float, model: int = 0) -> Mixture:
-        """Of a + b x, the model's own y without scatter."""
+        """Value a + b x of one model, without scatter."""
         far = x - self.pivot[:, model]
         return Mixture.of(
             self.log_weight[:, model],
@@ -147,7 +147,7 @@ class Fits:
         )
 
     def averaged(self, models: NDArray[np.intp]) -> Mixture:
-        """Of several models, shape (k,) of their places, each with the weight that it earned."""
+        """Slope averaged over several models, indices of shape (k,), by their evidence."""
         return Mixture.of(
             self.log_weight[:, models].ravel(),
             self.value[:, models].ravel(),
@@ -156,13 +156,13 @@ class Fits:
 
     @property
     def evidence(self) -> Array:
-        """Logarithm of each model's integrated likelihood, shape (m,); differences count."""
+        """Logarithm of each model's integrated likelihood, shape (m,), up to a constant."""
         top = self.log_weight.max(axis=0)
         return np.asarray(top + np.log(np.exp(self.log_weight - top).sum(axis=0)))
 
     @property
     def typical_deviation(self) -> Array:
-        """Weighted mean deviation of each model's number, shape (m,)."""
+        """Weighted mean deviation of each model's slope, shape (m,)."""
         weight = np.exp(self.log_weight - self.log_weight.max(axis=0))
         return np.asarray(np.sum(weight * self.deviation, axis=0) / np.sum(weight, axis=0))
 
@@ -172,12 +172,12 @@ class Fits:
 
 
 def fits(values: Array, columns: Array, own: Array) -> Fits:
-    """Fit y = a + b x, for each of m columns x by itself.
+    """Fit y = a + b x, separately for each of m columns x.
 
     Args:
-        values: y, shape (n,), in the order in which neighbours may know of each other.
+        values: y, shape (n,), in the order in which neighbors may be correlated.
         columns: x, shape (n, m), none of them constant.
-        own: covariance of the points' own errors, shape (n, n); zeros where there are none.
+        own: covariance of the points' own errors, shape (n, n); zeros without own errors.
 
     Raises ValueError for fewer than three points, for values that are not finite or do not differ,
     and for constant columns.
@@ -192,7 +192,7 @@ def fits(values: Array, columns: Array, own: Array) -> Fits:
     size = float(np.std(values))
     if not size > 1e-12 * float(np.max(np.abs(values))):
         raise ValueError("the values do not differ")
-    # Units of the scatter and of the columns: the quadrature needs no others.
+    # Scaled to the scatter and to the columns, for fixed limits of the quadrature.
     spread = np.std(columns, axis=0)
     y = (values - np.mean(values)) / size
     x = (columns - np.mean(columns, axis=0)) / spread
@@ -201,12 +201,12 @@ def fits(values: Array, columns: Array, own: Array) -> Fits:
     rotated = [_rotated(y, x, scaled, rho) for rho in _nodes()[0]]
     shares = _shares(scaled)
     taus = _range(rotated, typical, shares)
-    found = [
+    by_rho = [
         _fit(each, taus, typical, math.log(weight), shares)
         for each, weight in zip(rotated, _nodes()[1], strict=True)
     ]
     log_weight, value, deviation, pivot, level, level_deviation = (
-        np.concatenate(parts) for parts in zip(*found, strict=True)
+        np.concatenate(parts) for parts in zip(*by_rho, strict=True)
     )
     unit = size / spread
     return Fits(
@@ -228,9 +228,9 @@ def _nodes() -> tuple[Array, Array]:
 
 
 def _shares(own: Array) -> tuple[Array, Array]:
-    """Shares of the own errors that are independent, and logarithms of their weights.
+    """Independent shares of the own errors, and logarithms of their weights.
 
-    All of them where there are none, and where some of them are known to be common to some points.
+    Only the share 1 without own errors, and where their covariance has off-diagonal elements.
     """
     if not own.any() or np.any(own != np.diag(np.diag(own))):
         return np.ones(1), np.zeros(1)
@@ -246,7 +246,7 @@ def _nodes_of_shares() -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class _Rotated:
-    """Everything in coordinates in which both covariances are diagonal: own 1, between `size`."""
+    """Data in coordinates in which both covariances are diagonal: own 1, between `size`."""
 
     y: Array
     one: Array
@@ -276,7 +276,7 @@ def _rotated(y: Array, x: Array, own: Array, rho: float) -> _Rotated:
 
 
 def _range(rotated: list[_Rotated], typical: float, shares: tuple[Array, Array]) -> Array:
-    """Nodes of tau that hold nearly all of the weight, shape (`FINE`,), even in the logarithm."""
+    """Nodes of tau with almost all of the weight, shape (`FINE`,), even in the logarithm."""
     least = max(0.02 * typical, FLOOR)
     decades = math.log10(WIDEST / least)
     taus = np.geomspace(least, WIDEST, max(8, round(COARSE * decades)))
@@ -293,10 +293,10 @@ def _range(rotated: list[_Rotated], typical: float, shares: tuple[Array, Array])
 def _fit(
     at: _Rotated, taus: Array, typical: float, weight: float, shares: tuple[Array, Array]
 ) -> tuple[Array, ...]:
-    """As the first fields of `Fits`, for one rho: shapes (k t, m) and (k t,).
+    """First fields of `Fits` for one rho: shapes (k t, m) and (k t,).
 
-    There are t nodes of tau over the share of the own errors, and k of that share: it is a factor
-    of all deviations, so that nothing has to be worked out anew for it.
+    There are t nodes of tau over the share of the own errors, and k nodes of that share, which is a
+    common factor of all deviations and needs no new calculation.
     """
     spread = 1.0 + taus[:, None] ** 2 * at.size
     w = 1.0 / spread
