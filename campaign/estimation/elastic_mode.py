@@ -17,14 +17,14 @@ systematic parts and no corrections.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from campaign.arrays import Array, ComplexArray, Flags
 from campaign.estimate import Estimate
-from campaign.estimation.frequency_response import Response
-from campaign.estimation.gate import admitted
+from campaign.estimation.frequency_response import Response, held
+from campaign.estimation.gate import admitted, refused
 from campaign.estimation.intervals import shifted_by, with_error
 
 SPAN = 2.0
@@ -38,8 +38,10 @@ SMALLEST_PEAK = 0.03
 """... and stand out of it by this share."""
 APART = 0.3
 """Logarithm of antiresonance over resonance up to which the parabola stands for all else."""
+WIDE = 0.5
+"""Damping ratio up to which a mode is narrower than the window of its fit."""
 NEARLY = 0.99
-"""of that is at this bound: the response is no small mode on top of a smooth one."""
+"""of these is at a bound: the response is no small mode on top of a smooth one."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,8 @@ def elastic_mode(response: Response) -> ElasticMode | None:
     """The most prominent mode of a response.
 
     None when the response is smooth without one, and where antiresonance and resonance lie too far
-    apart.
+    apart, or are hardly told apart. Not determined where a spring holds the axis at the lowest
+    frequencies.
     """
     frequency = response.frequency
     logarithm = np.log(np.maximum(np.abs(response.values), 1e-300)) + 1j * response.phase
@@ -76,7 +79,16 @@ def elastic_mode(response: Response) -> ElasticMode | None:
             gain = _evidence(frequency[window], logarithm[window], float(candidate), damping)
             if best is None or gain > best[0]:
                 best = gain, float(candidate)
-    return None if best is None else _refine(frequency, logarithm, best[1])
+    found = None if best is None else _refine(frequency, logarithm, best[1])
+    why = held(response)
+    if found is None or not why:
+        return found
+    return replace(
+        found,
+        frequency=refused(found.frequency, why),
+        damping_ratio=refused(found.damping_ratio, why),
+        antiresonance=refused(found.antiresonance, why),
+    )
 
 
 def _window(frequency: Array, centre: float) -> Flags:
@@ -125,7 +137,7 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
         left = _left(basis, np.asarray(y - _mode(f, p)))
         return np.concatenate([left.real, left.imag])
 
-    lower, upper = [centre / 1.3, 1e-4, -APART, 1e-4], [centre * 1.3, 0.5, APART, 0.5]
+    lower, upper = [centre / 1.3, 1e-4, -APART, 1e-4], [centre * 1.3, WIDE, APART, WIDE]
     fits = [
         least_squares(residual, [centre, 0.03, shift, 0.03], bounds=(lower, upper))
         for shift in (-0.01, 0.01)
@@ -134,7 +146,8 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
     smooth = float(np.sum(np.abs(_left(basis, y)) ** 2))
     explained = smooth / max(2.0 * float(fit.cost), 1e-30)
     peak = float(np.max(np.abs(np.exp(_mode(np.linspace(f[0], f[-1], 2000), fit.x)) - 1.0)))
-    if explained < EVIDENCE or peak < SMALLEST_PEAK or abs(fit.x[2]) > NEARLY * APART:
+    at_bound = np.any(np.abs(fit.x[1:]) > NEARLY * np.array([WIDE, APART, WIDE]))
+    if explained < EVIDENCE or peak < SMALLEST_PEAK or at_bound:
         return None
     drag = float(np.tan(_lead(f, (y - _mode(f, fit.x)).imag)))
     return _mode_found(fit.x, fit.jac, fit.fun, explained, drag)
@@ -152,8 +165,11 @@ def _lead(frequency: Array, phase: Array) -> float:
 
 def _mode_found(
     p: Array, jacobian: Array, left: Array, explained: float, drag: float
-) -> ElasticMode:
+) -> ElasticMode | None:
     """The mode of the parameters `p` of `_mode`, with intervals.
+
+    None where the antiresonance does not surely lie below the resonance: of a part that hangs on
+    the load it does, and friction that yields with falling amplitude has neither.
 
     drag: friction over the reaction of the inertia, D above.
 
@@ -171,6 +187,9 @@ def _mode_found(
         error = float(np.sqrt(gradient @ covariance @ gradient))
         return with_error(name, value, unit, error, freedom, "mode on top of a smooth response")
 
+    high = estimate("apart", shift, "", np.eye(4)[2]).high
+    if high is None or high >= 0.0:
+        return None
     resonance = estimate("elastic_mode_frequency", pole, "Hz", np.eye(4)[0])
     ratio = estimate("damping_ratio", damping, "", np.eye(4)[1])
     return ElasticMode(

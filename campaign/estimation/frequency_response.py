@@ -14,11 +14,21 @@ import numpy as np
 
 from campaign.arrays import Array, ComplexArray
 from campaign.estimation.sine_point import SinePoint, mean_point
+from campaign.reason import NONE, Cause, Reason
 
 MOST_ERROR = 0.2
 """of a point's own size: with more its phase is hardly known, nor its level."""
 NEIGHBOURS = 2
 """Points on each side whose median size with it stands for its own."""
+SPRING = 0.25 * np.pi
+"""Lead (rad) of rate before torque from which on the spring's reaction, less that of the inertia,
+exceeds that of damping. Dry friction that slides acts in phase with the rate above all. It is four
+standard deviations of the phase of a point with `MOST_ERROR`."""
+HELD = Cause(
+    "held by a spring",
+    "the rate leads the torque by {degrees:.0f}° at {frequency:.3g} Hz: a spring holds the axis, "
+    "as friction does before it slides (excite until it slides)",
+)
 
 
 @dataclass(frozen=True)
@@ -65,6 +75,22 @@ class Response:
         return Response(
             self.frequency[kept], self.values[kept], self.error[kept], self.coherence[kept]
         )
+
+
+def held(response: Response) -> Reason:
+    """Why a response of torque to rate is none of a free axis; false where it may be one.
+
+    A free axis lags below its first antiresonance, whatever is elastic in it. Where bristles or any
+    other spring hold it, the rate leads below the first resonance, and the gain rises up to it. Of
+    a free axis with the sign reversed it falls.
+    """
+    told = response.told
+    if len(told.frequency) < 2:
+        return NONE
+    size, lead = np.abs(told.values), float(np.angle(told.values[0]))
+    if np.max(size) <= size[0] or not SPRING < lead < np.pi - SPRING:
+        return NONE
+    return HELD(frequency=float(told.frequency[0]), degrees=float(np.degrees(lead)))
 
 
 def make_response(points: Sequence[SinePoint]) -> Response:

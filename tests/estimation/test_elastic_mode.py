@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from campaign.estimate import Origin
 from campaign.estimation.elastic_mode import _freedom, elastic_mode
-from campaign.estimation.frequency_response import Response
+from campaign.estimation.frequency_response import HELD, Response
+from campaign.estimation.frequency_response import held as is_held
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.drives import Drive
 from tests.estimation.loops import SWEEP, response
@@ -99,3 +101,54 @@ def test_residuals_that_resemble_their_neighbours_count_less() -> None:
     pairs = np.repeat(np.tile([1.0, -1.0, -1.0, 1.0], 50), 2)
     assert _freedom(white, 10) == pytest.approx(190.0, rel=0.01)
     assert _freedom(pairs, 10) == pytest.approx(390.0 / 3.0, rel=0.02)
+
+
+def on_spring(stiffness: float, damping: float = 6.0) -> Response:
+    """Rate per torque of 1 kg m^2 on a spring to the ground."""
+    return response(lambda s: s / (s**2 + damping * s + stiffness), np.arange(2.0, 40.0, 0.25))
+
+
+def test_what_a_spring_holds_leads_below_its_resonance() -> None:
+    """By atan((k / w - J w) / b); an axis that nothing holds lags, with a mode or without one."""
+    bristles = on_spring((2 * np.pi * 10.7) ** 2)
+    why = is_held(bristles)
+    assert why in HELD
+    lead = np.arctan((10.7 / 2.0 - 2.0 / 10.7) * 2 * np.pi * 10.7 / 6.0)
+    assert dict(why.values) == {"frequency": 2.0, "degrees": pytest.approx(np.degrees(lead))}
+    for free in (hung, lambda s: 1 / (65.0 * s + 300.0), lambda s: -1 / (65.0 * s + 30.0)):
+        assert not is_held(response(free))
+
+
+def test_a_spring_weaker_than_the_damping_beside_it_does_not_hold() -> None:
+    """At the lowest point k / w - J w passes b between these two stiffnesses."""
+    w = 2 * np.pi * 2.0
+    both = w * (6.0 + w)
+    assert is_held(on_spring(1.01 * both)) in HELD
+    assert not is_held(on_spring(0.99 * both))
+
+
+def test_a_mode_of_an_axis_on_bristles_is_not_determined() -> None:
+    """With a response that begins where they hold it; above them the same mode is told."""
+    own = 65.0 * (2 * np.pi * 2.3) ** 2
+    for lowest, told in ((0.5, False), (3.0, True)):
+        at = SWEEP[lowest <= SWEEP]
+        mode = elastic_mode(response(lambda s: 1 / (1 / hung(s) + own / s), at))
+        assert mode is not None
+        for one in (mode.frequency, mode.damping_ratio, mode.antiresonance):
+            assert (one.origin is Origin.MEASURED) is told
+            assert (one.reason in HELD) is not told
+
+
+def test_a_mode_as_wide_as_the_window_is_none() -> None:
+    """Its damping ratio, of 0.6, ends at the bound of the fit."""
+
+    def bent(s: np.ndarray) -> np.ndarray:
+        w, own = 2 * np.pi * 20.0, 2 * np.pi * 18.0
+        return (s**2 + own * s + own**2) / (s**2 + 1.2 * w * s + w**2) / (65.0 * s)
+
+    assert elastic_mode(response(bent, np.arange(4.0, 60.0, 0.5))) is None
+
+
+def test_a_resonance_below_its_antiresonance_is_no_part_that_hangs_on_the_load() -> None:
+    assert elastic_mode(response(hung)) is not None
+    assert elastic_mode(response(lambda s: 1 / hung(s) / (65.0 * s) ** 2)) is None

@@ -13,6 +13,8 @@ import pytest
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.drive import TwoMass
+from campaign.estimation.frequency_response import HELD
+from campaign.experiments.frequency_response.model.analysis import _parameters
 from campaign.experiments.frequency_response.model.axis_numbers import (
     BENT,
     FRICTION,
@@ -21,6 +23,7 @@ from campaign.experiments.frequency_response.model.axis_numbers import (
     by_rule,
     of_axis,
 )
+from campaign.experiments.frequency_response.model.frequency_fit import Masses
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
@@ -28,7 +31,7 @@ from campaign.reason import Reason
 from campaign.result import Result
 from tests.estimation.coverage import holds
 from tests.experiments.asked import asked
-from tests.experiments.laboratory import Done, execute, trials
+from tests.experiments.laboratory import Done, analyse, execute, trials
 
 AMPLITUDES = ("4.5 deg/s", "9 deg/s")
 
@@ -193,3 +196,44 @@ def test_a_weaker_that_fits_nothing_tells_nothing() -> None:
     misfit = replace(drive(), misfit="it leaves more than scatter")
     found = of_axis(drive(total_inertia=2.0), 0.1, [Weaker(misfit, 2.0)])
     assert found.total_inertia.reason in UNKNOWN
+
+
+@pytest.mark.parametrize("told_too", [{}, {"resonance": 12.0}])
+def test_a_damping_is_told_with_its_resonance(told_too: Mapping[str, float]) -> None:
+    one = drive(total_inertia=2.0, resonance_damping=0.3, **told_too)
+    made = _parameters(Masses(one, None, axis=one), cast("Any", None))
+    (damping,) = [each.estimate for each in made if each.estimate.name == "resonance_damping"]
+    assert damping.is_determined is bool(told_too)
+    assert damping.reason.code == ("" if told_too else "test")
+
+
+@cache
+def small(hung: bool, kind: str) -> tuple[Done, ...]:
+    """Of `simulink` far below breakaway: its inertia resonates on its bristles at 10.7 Hz."""
+    tree = load_bench("simulink").model_dump(mode="json")
+    if hung:
+        tree["appendage"] = {"inertia": 3.5, "frequency": 11.0, "damping_ratio": 0.02}
+    lines = {"signal": "multisine", "lowest": "1 Hz", "highest": "60 Hz", "period": "2 s"}
+    options = {
+        "rate": {**lines, "amplitude": "0.02 deg/s"},
+        "few": {**lines, "amplitude": "0.02 deg/s", "realisations": 2},
+        "sines": {"loop": "open", "torque": "4 N m", "lowest": "2 Hz", "highest": "40 Hz"},
+    }[kind]
+    own = "frequency_response" if kind == "sines" else "excitation"
+    return execute(trials(own, Bench.model_validate(tree, context={"si": True}), options))
+
+
+@pytest.mark.parametrize("kind", ["rate", "few", "sines"])
+@pytest.mark.parametrize("hung", [False, True])
+def test_no_number_of_the_axis_is_told_of_what_its_bristles_hold(hung: bool, kind: str) -> None:
+    found = asked("frequency_response", small(hung, kind))
+    assert not [
+        each for each in found.identified.parameters if each.estimate.origin is Origin.MEASURED
+    ]
+    modes = [row for table in found.tables if table.key == "modes" for row in table.rows]
+    assert not [row for row in modes if cast("Estimate", row["frequency"]).is_determined]
+    if kind == "sines":
+        for each in analyse("frequency_response", small(hung, kind)).findings:
+            assert each.known.origin is not Origin.MEASURED
+    elif kind == "rate":
+        assert {each.estimate.reason.code for each in found.identified.parameters} == {HELD.code}

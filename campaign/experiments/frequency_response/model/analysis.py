@@ -18,7 +18,7 @@ from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.estimation.frequency.one_inertia import RIGID
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency.welch import Estimator
-from campaign.estimation.gate import admitted, admitted_together
+from campaign.estimation.gate import admitted, admitted_together, refused
 from campaign.estimation.intervals import MODEL_MISFIT
 from campaign.experiments.frequency_response.model.axis_numbers import by_rule, odd_distortion
 from campaign.experiments.frequency_response.model.frequency_fit import (
@@ -194,6 +194,10 @@ def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:
         return
     keys = {"total_inertia": "axis.inertia", **(APPENDAGE if hangs_on_load else {})}
     passed = admitted_together({each[0]: getattr(told.axis, each[0]) for each in MEANINGS}, {})
+    for mode in ("resonance", "antiresonance"):
+        if not passed[mode].is_determined:  # nor is the damping of what is not there
+            name = f"{mode}_damping"
+            passed[name] = refused(passed[name], passed[mode].reason)
     for name, meaning, unit, advice in MEANINGS:
         # Friction may leave only a damping open; then the other numbers are reported.
         key = "" if told.bent else keys.get(name, "")

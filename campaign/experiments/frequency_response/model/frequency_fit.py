@@ -16,6 +16,8 @@ from campaign.estimation.frequency.modes import Mode, chosen_modes
 from campaign.estimation.frequency.orders import ChosenOrder, chosen_order
 from campaign.estimation.frequency.two_mass import two_mass
 from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency_response import held
+from campaign.estimation.gate import refused
 from campaign.estimation.servo import ServoCharacteristics, characteristics
 from campaign.experiments.frequency_response.model.axis_numbers import (
     UNKNOWN,
@@ -124,6 +126,9 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
             except ValueError as error:
                 remarks.append(f"{source.name}, {side}: {error}.")
     modes |= {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
+    for side in modes:
+        if why := _held(source, side, band):
+            modes[side] = tuple(_refused(mode, why) for mode in modes[side])
     local: dict[Side, ElasticMode] = {}
     for side in source.responses:
         if side in modes:
@@ -134,6 +139,14 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
             local[side] = mode
     margins = None if source.closed is None or few else characteristics(source.closed)
     return FrequencyFit(source, fits, modes, local, margins, tuple(remarks))
+
+
+def _held(source: Source, side: Side, band: Band) -> Reason:
+    return held(fitted_part(source, side, band.lowest, band.highest).response)
+
+
+def _refused(mode: Mode, why: Reason) -> Mode:
+    return replace(mode, frequency=refused(mode.frequency, why), damping=refused(mode.damping, why))
 
 
 def too_few(source: Source) -> Reason:
@@ -192,6 +205,9 @@ def masses(
     if found is None:
         return Masses(None, None, NOTHING_FITTED())
     source = found.source
+    for side in source.responses:
+        if why := _held(source, side, band):
+            return Masses(None, source, why)
     first = min(float(each.frequency[0]) for each in source.responses.values())
     try:
         result = _placed(source, bench, place, band, torque)
