@@ -39,7 +39,7 @@ EVALUATIONS = 60
 FEW = 8
 """Most evaluations with one parameter fixed near the best fit."""
 TOLERANCE = 1e-8
-"""Relative change of the sum of squares at which a search ends: for 1e5 samples a hundredth of the
+"""Relative change of the sum of squares at which a search ends: for 1e5 samples a thousandth of the
 change by one deviation of a parameter."""
 ROUNDS = 1
 """Iterations that estimate each channel's deviation from its residuals."""
