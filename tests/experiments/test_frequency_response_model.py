@@ -198,7 +198,7 @@ def test_friction_is_a_systematic_part_where_two_amplitudes_tell_it(tmp_path: Pa
     assert total.bench == ""
     # Nor what friction shifts besides, by an amount that is not known.
     assert not any(each.bench for each in one.identified.parameters)
-    assert any("Repeat it at half the amplitude" in note for note in one.notes)
+    assert any("Repeat it at half or twice the amplitude" in note for note in one.notes)
     all_of_them = [*weak, *strong]
     made = trials(tmp_path, all_of_them, "torque", 8.0)
     both = identified(tmp_path, made, rubbing(all_of_them, 8.0))

@@ -98,7 +98,7 @@ def test_one_amplitude_tells_the_response_and_not_the_axis() -> None:
         assert whose["the response"][name].has_interval
         assert not holds(whose["the response"][name], truths()[name])
         assert not whose["the axis"][name].has_interval
-    assert any("Repeat it at half the amplitude" in note for note in found.notes)
+    assert any("Repeat it at half or twice the amplitude" in note for note in found.notes)
 
 
 @pytest.mark.slow

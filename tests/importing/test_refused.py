@@ -249,7 +249,7 @@ file = "a.csv"
     with pytest.raises(UsageError, match=r"axis is rotary: is it linear \(axis.kind\)"):
         prepare(Request(str(tmp_path / "m.toml"), backend="import"))
     (tmp_path / "m.toml").write_text(mapping.replace('"mm"', '"mrad"'))
-    with pytest.raises(UsageError, match=r"\[columns.NAME.drive_torque\] which column"):
+    with pytest.raises(UsageError, match=r"assign a column by \[columns.NAME.drive_torque\]"):
         prepare(Request(str(tmp_path / "m.toml"), backend="import")).open_backend()
 
 

@@ -35,7 +35,7 @@ SWEPT = GOOD + "[test.matrix]\n"
         # What every test has.
         (GOOD.replace('"swing"', '§"swign"'), r"unknown kind 'swign'.*speeds.*'swing'\?"),
         (GOOD.replace('"swing"', "§7"), r"7 is not text"),
-        (GOOD.replace('[[test]]\nname = "t"', "§[[test]]"), r"'name' is missing: What the test"),
+        (GOOD.replace('[[test]]\nname = "t"', "§[[test]]"), r"'name' is missing: Name of the test"),
         (GOOD.replace('"t"', "§[]"), r"a list is not text in quotes"),
         (GOOD.replace('"t"', '§"Tea Time"'), r"'Tea Time': must be lower-case letters and digits"),
         (GOOD.replace('"simulink"', '§"simulik"'), r"no shipped bench.*or the path.*'simulink'\?"),
