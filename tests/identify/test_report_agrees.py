@@ -43,7 +43,7 @@ QUANTITIES = {
     "torque": {"resonance": "elastic_mode_frequency"},
 }
 """By model, or by the mode of its trials: what a report calls a number."""
-MOST = 67
+MOST = 100
 """of the trials of a sweep or map."""
 
 

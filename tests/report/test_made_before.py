@@ -134,7 +134,7 @@ def test_that_no_trial_failed_is_said(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = report(run, tmp_path / "out", trials="failed")
-    assert "--trials failed: there is none" in capsys.readouterr().err
+    assert "--trials failed: no such trial" in capsys.readouterr().err
     assert not (folder / "trials").exists()
 
 

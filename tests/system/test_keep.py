@@ -143,7 +143,7 @@ def test_a_repetition_that_differs_is_seen_by_its_digests(runs, tmp_path, capsys
     ("protocol", "backend", "why"),
     [
         (SEA, "replay", "only a simulated trial"),
-        (SEA.replace("stabilization", "excitation").split("cycles")[0], "sim", "from samples"),
+        (SEA.replace("stabilization", "excitation").split("cycles")[0], "sim", "needs samples"),
     ],
 )
 def test_where_samples_would_be_missed_nothing_is_executed(

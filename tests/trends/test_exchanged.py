@@ -84,7 +84,7 @@ def test_it_is_said_on_the_command_line_and_beside_the_jump(runs: Path) -> None:
     piece = _exchange(runs, told)
     assert piece == ("torque constant", runs / "jump-5.nxs")
     for wrong in ("torque constant", "@jump-5", "torque constant@"):
-        with pytest.raises(UsageError, match="say it as"):
+        with pytest.raises(UsageError, match='write "torque constant@RUN"'):
             _exchange(runs, wrong)
     own: list[RunReader] = [open_run(runs / f"jump-{n}.nxs") for n in range(8)]
     trends = follow(own, experiments(), exchanged=[piece])
