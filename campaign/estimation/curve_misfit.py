@@ -72,7 +72,7 @@ def curve_misfit(speed: Array, residuals: Array, influence: Array) -> CurveMisfi
     if freedom < 2 or size == 0.0:
         return None
     p = _p_value(shared / size, sizes)
-    if p > DOUBTED:
+    if not p < DOUBTED:
         return None
     beyond = (shared - size * float(sizes.mean())) / (freedom * float(sizes.var()))
     all_of_it = size / float(sizes.sum())

@@ -115,7 +115,7 @@ class DirectionFit:
         scatters: how points deviate beyond that; by the larger, where they do not tell which.
         fits: by model.
         lack_of_fit: p-value of `free` against repeated points; None without repeats.
-        curve_misfit: what residuals of `free` have in common; None where that is nothing.
+        curve_misfit: of `free`; None if the residuals show none.
     """
 
     place: Array
@@ -451,5 +451,6 @@ def doubts(fit: DirectionFit) -> Iterator[str]:
     if fit.curve_misfit is not None:
         yield (
             f"residuals of neighboring speeds are alike (p = {fit.curve_misfit.p:.2g}): the "
-            "points do not follow Equation 4.6, and intervals include that"
+            "points do not follow Equation 4.6; intervals of parameters include that, the curve's "
+            "band does not"
         )

@@ -159,3 +159,24 @@ def test_exact_and_few_points_show_no_misfit() -> None:
     influence = np.linalg.pinv(np.vander(np.log(speed), 5))
     assert curve_misfit(speed, np.ones(6), influence) is None  # one degree of freedom
     assert curve_misfit(speeds(12), np.zeros(12), np.zeros((2, 12))) is None
+
+
+@pytest.mark.parametrize(("share", "scatters"), [(3.0, True), (1e3, False)])
+def test_the_size_follows_from_two_moments(share: float, scatters: bool) -> None:
+    """E r'r and E r'Kr over both variances, solved; without scatter r'r alone decides."""
+    random, count = np.random.default_rng(4), 40
+    speed, place = speeds(count), np.log(speeds(count))
+    jacobian = np.stack([np.ones(count), place], axis=1)
+    kernel = np.exp(-0.5 * ((place[:, None] - place) * 3.0 / np.ptp(place)) ** 2)
+    rows = np.linalg.qr(jacobian, mode="complete")[0][:, 2:].T  # what no parameter follows
+    within = rows @ kernel @ rows.T
+    torque = random.multivariate_normal(np.zeros(count), np.eye(count) + share * kernel)
+    rest = rows @ torque
+    found = curve_misfit(speed, rows.T @ rest, np.linalg.pinv(jacobian))
+    assert found is not None
+    first = np.trace(within)
+    moments = np.array([[len(rest), first], [first, np.sum(within**2)]])
+    scatter, size = np.linalg.solve(moments, [rest @ rest, rest @ within @ rest])
+    assert bool(scatter > 0.0) is scatters
+    expected = size if scatters else rest @ rest / first
+    assert found.covariance == pytest.approx(expected * kernel)
