@@ -16,7 +16,7 @@ import numpy as np
 from campaign.arrays import Array
 from campaign.estimation.least_squares import NULL
 
-DOUBTED = 0.02
+SIGNIFICANCE = 0.02
 """p-value of the residuals below which the curve misfits. Of maps without misfit, one in 25 has a
 false alarm in one of its two directions. With 8 speeds, where the beta distribution is least exact,
 the rate for a direction is 0.035."""
@@ -27,8 +27,8 @@ class CurveMisfit:
     """A difference between friction and a curve that changes slowly over speed.
 
     Attributes:
-        p: of residuals that are this alike, were they scatter alone.
-        length: over which it varies, as a difference of logarithms of speed.
+        p: p-value of the residuals under scatter alone.
+        length: correlation length, as a difference of logarithms of speed.
         covariance: of the difference at each speed, over the deviations there, shape (n, n).
     """
 
@@ -61,22 +61,22 @@ def curve_misfit(speed: Array, residuals: Array, influence: Array) -> CurveMisfi
     """
     place = np.log(speed)
     length = float(np.ptp(place)) / (len(influence) + 1)
-    alike = np.exp(-0.5 * (np.subtract.outer(place, place) / length) ** 2)
+    kernel = np.exp(-0.5 * (np.subtract.outer(place, place) / length) ** 2)
     norm = np.linalg.norm(influence, axis=1, keepdims=True)
     scaled = influence / np.maximum(norm, np.finfo(float).tiny)
     # What a fit leaves of torques: all that no parameter follows.
     left = np.eye(len(place)) - np.linalg.pinv(scaled, rcond=NULL) @ scaled
     rest, freedom = left @ residuals, round(float(np.trace(left)))
-    sizes = np.linalg.eigvalsh(left @ alike @ left)[-freedom:]
-    size, shared = float(rest @ rest), float(rest @ alike @ rest)
+    sizes = np.linalg.eigvalsh(left @ kernel @ left)[-freedom:]
+    size, shared = float(rest @ rest), float(rest @ kernel @ rest)
     if freedom < 2 or size == 0.0:
         return None
     p = _p_value(shared / size, sizes)
-    if not p < DOUBTED:
+    if not p < SIGNIFICANCE:
         return None
     beyond = (shared - size * float(sizes.mean())) / (freedom * float(sizes.var()))
     all_of_it = size / float(sizes.sum())
-    return CurveMisfit(p, length, min(beyond, all_of_it) * alike)
+    return CurveMisfit(p, length, min(beyond, all_of_it) * kernel)
 
 
 def _p_value(ratio: float, sizes: Array) -> float:

@@ -23,7 +23,7 @@ import numpy as np
 
 from campaign.arrays import Array, ComplexArray, Flags
 from campaign.estimate import Estimate
-from campaign.estimation.frequency_response import Response, held
+from campaign.estimation.frequency_response import Response, held_by_spring
 from campaign.estimation.gate import admitted, refused
 from campaign.estimation.intervals import shifted_by, with_error
 
@@ -80,7 +80,7 @@ def elastic_mode(response: Response) -> ElasticMode | None:
             if best is None or gain > best[0]:
                 best = gain, float(candidate)
     found = None if best is None else _refine(frequency, logarithm, best[1])
-    why = held(response)
+    why = held_by_spring(response)
     if found is None or not why:
         return found
     return replace(

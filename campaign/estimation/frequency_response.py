@@ -77,7 +77,7 @@ class Response:
         )
 
 
-def held(response: Response) -> Reason:
+def held_by_spring(response: Response) -> Reason:
     """Why a response of torque to rate is none of a free axis; false where it may be one.
 
     A free axis lags below its first antiresonance, whatever is elastic in it. Where bristles or any

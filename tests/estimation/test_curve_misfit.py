@@ -14,7 +14,7 @@ from scipy.stats import binomtest
 
 from campaign.arrays import Array
 from campaign.estimation.both_directions import fitted_nominal
-from campaign.estimation.curve_misfit import DOUBTED, curve_misfit
+from campaign.estimation.curve_misfit import SIGNIFICANCE, curve_misfit
 from campaign.estimation.stribeck import PARAMETERS, stribeck
 from campaign.estimation.velocity_map import (
     FORM,
@@ -97,7 +97,7 @@ def test_maps_that_fit_keep_their_intervals(count: int) -> None:
     random = np.random.default_rng(7)
     maps = [fitted(of_equation, count, random) for _ in range(60)]
     alarms = [each for each in maps if each.curve_misfit is not None]
-    assert binomtest(len(alarms), len(maps), DOUBTED, "greater").pvalue > 0.005
+    assert binomtest(len(alarms), len(maps), SIGNIFICANCE, "greater").pvalue > 0.005
     for each in maps:
         if each.curve_misfit is None:
             assert each.misfit_part("free", "coulomb_torque") == 0.0
@@ -109,7 +109,7 @@ def test_p_values_are_those_of_scatter(
     count: int, free: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of a linear fit with white residuals p is uniform: 2000 draws, shares within four sigmas."""
-    monkeypatch.setattr("campaign.estimation.curve_misfit.DOUBTED", 1.0)
+    monkeypatch.setattr("campaign.estimation.curve_misfit.SIGNIFICANCE", 1.0)
     p = p_values(count, free)
     for level in (0.02, 0.05, 0.5):
         share = np.mean(p < level)
@@ -128,7 +128,7 @@ def p_values(count: int, free: int) -> Array:
 
 def test_the_rarest_degrees_of_freedom_raise_few_false_alarms() -> None:
     """Of 8 speeds and 5 parameters the beta distribution is least exact."""
-    assert np.mean(p_values(8, 5) < DOUBTED) < 0.05
+    assert np.mean(p_values(8, 5) < SIGNIFICANCE) < 0.05
 
 
 def test_what_moves_a_parameter_is_as_large_as_it_is_said() -> None:

@@ -11,7 +11,7 @@ import pytest
 from campaign.estimate import Origin
 from campaign.estimation.elastic_mode import _freedom, elastic_mode
 from campaign.estimation.frequency_response import HELD, Response
-from campaign.estimation.frequency_response import held as is_held
+from campaign.estimation.frequency_response import held_by_spring
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.drives import Drive
 from tests.estimation.loops import SWEEP, response
@@ -111,20 +111,20 @@ def on_spring(stiffness: float, damping: float = 6.0) -> Response:
 def test_what_a_spring_holds_leads_below_its_resonance() -> None:
     """By atan((k / w - J w) / b); an axis that nothing holds lags, with a mode or without one."""
     bristles = on_spring((2 * np.pi * 10.7) ** 2)
-    why = is_held(bristles)
+    why = held_by_spring(bristles)
     assert why in HELD
     lead = np.arctan((10.7 / 2.0 - 2.0 / 10.7) * 2 * np.pi * 10.7 / 6.0)
     assert dict(why.values) == {"frequency": 2.0, "degrees": pytest.approx(np.degrees(lead))}
     for free in (hung, lambda s: 1 / (65.0 * s + 300.0), lambda s: -1 / (65.0 * s + 30.0)):
-        assert not is_held(response(free))
+        assert not held_by_spring(response(free))
 
 
 def test_a_spring_weaker_than_the_damping_beside_it_does_not_hold() -> None:
     """At the lowest point k / w - J w passes b between these two stiffnesses."""
     w = 2 * np.pi * 2.0
     both = w * (6.0 + w)
-    assert is_held(on_spring(1.01 * both)) in HELD
-    assert not is_held(on_spring(0.99 * both))
+    assert held_by_spring(on_spring(1.01 * both)) in HELD
+    assert not held_by_spring(on_spring(0.99 * both))
 
 
 def test_a_mode_of_an_axis_on_bristles_is_not_determined() -> None:

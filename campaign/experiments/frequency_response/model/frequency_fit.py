@@ -16,7 +16,7 @@ from campaign.estimation.frequency.modes import Mode, chosen_modes
 from campaign.estimation.frequency.orders import ChosenOrder, chosen_order
 from campaign.estimation.frequency.two_mass import two_mass
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import held
+from campaign.estimation.frequency_response import held_by_spring
 from campaign.estimation.gate import refused
 from campaign.estimation.servo import ServoCharacteristics, characteristics
 from campaign.experiments.frequency_response.model.axis_numbers import (
@@ -127,7 +127,7 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
                 remarks.append(f"{source.name}, {side}: {error}.")
     modes |= {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
     for side in modes:
-        if why := _held(source, side, band):
+        if why := _held_by_spring(source, side, band):
             modes[side] = tuple(_refused(mode, why) for mode in modes[side])
     local: dict[Side, ElasticMode] = {}
     for side in source.responses:
@@ -141,8 +141,8 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
     return FrequencyFit(source, fits, modes, local, margins, tuple(remarks))
 
 
-def _held(source: Source, side: Side, band: Band) -> Reason:
-    return held(fitted_part(source, side, band.lowest, band.highest).response)
+def _held_by_spring(source: Source, side: Side, band: Band) -> Reason:
+    return held_by_spring(fitted_part(source, side, band.lowest, band.highest).response)
 
 
 def _refused(mode: Mode, why: Reason) -> Mode:
@@ -206,7 +206,7 @@ def masses(
         return Masses(None, None, NOTHING_FITTED())
     source = found.source
     for side in source.responses:
-        if why := _held(source, side, band):
+        if why := _held_by_spring(source, side, band):
             return Masses(None, source, why)
     first = min(float(each.frequency[0]) for each in source.responses.values())
     try:
