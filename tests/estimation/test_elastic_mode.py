@@ -10,8 +10,7 @@ import pytest
 
 from campaign.estimate import Origin
 from campaign.estimation.elastic_mode import _freedom, elastic_mode
-from campaign.estimation.frequency_response import HELD, Response
-from campaign.estimation.frequency_response import held_by_spring
+from campaign.estimation.frequency_response import HELD, Response, held_by_spring
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.drives import Drive
 from tests.estimation.loops import SWEEP, response
