@@ -10,14 +10,17 @@ import pickle
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.context import BaseContext
-from typing import Any
+from typing import Any, TypeVar
 
 from campaign.gc_threshold import raise_gc_threshold
 
+P = TypeVar("P")
+R = TypeVar("R")
 START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 """Not fork: this process has threads, and a fork would keep their locks locked."""
 
@@ -79,6 +82,19 @@ def process_pool(
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def in_order(pool: ProcessPoolExecutor, work: Callable[[P], R], parts: Sequence[P]) -> Iterator[R]:
+    """Results of `work` for each part, in order; a part whose process died is done in this one."""
+    begun: list[Future[R]] = []
+    with contextlib.suppress(BrokenProcessPool):  # earlier futures stay
+        begun.extend(pool.submit(work, part) for part in parts)
+    for place, part in enumerate(parts):
+        try:
+            result = begun[place].result()
+        except (IndexError, BrokenProcessPool):
+            result = work(part)
+        yield result
 
 
 def _begin(handed: bytes) -> None:

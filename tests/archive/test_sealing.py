@@ -5,6 +5,7 @@ when.
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.header import PARTIAL
 from campaign.archive.layout.journal import JOURNAL, read_journal
 from campaign.archive.layout.run_folder import SEALING
+from campaign.archive.reading import in_parts
 from campaign.archive.reading.series import Series
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing import packed_file, seal_run, sealed_entry, sealed_file
@@ -176,7 +178,15 @@ def move_samples(opened: h5py.File) -> None:
     exchange(opened["trial_00001"])
 
 
-TEXTS = ("run/journal/data", "run/title", "run/outcome/status", "trial_00001/record/json")
+TEXTS = ("run/journal/data", "run/title", "run/outcome/status")
+
+
+IN_TRIALS = [
+    ("trial_00001/record/json", "/trial_00001/record/json: does not match its checksum"),
+    (lose_trial, "/trial_00002"),
+    (put_unit, "/trial_00003/data/command@units: is 'deg/s', and 'rad/s' was recorded"),
+    (move_samples, "/trial_00001/data/command: does not lie where it was written"),
+]
 
 
 @pytest.mark.parametrize(
@@ -185,9 +195,7 @@ TEXTS = ("run/journal/data", "run/title", "run/outcome/status", "trial_00001/rec
         *((place, f"/{place}: does not match its checksum") for place in TEXTS),
         (put_seal, "/run/outcome/seal: does not match its checksum"),
         (put_count, "/run/outcome/trials_finished: does not match its checksum"),
-        (lose_trial, "/trial_00002"),
-        (put_unit, "/trial_00003/data/command@units: is 'deg/s', and 'rad/s' was recorded"),
-        (move_samples, "/trial_00001/data/command: does not lie where it was written"),
+        *IN_TRIALS,
     ],
 )
 def test_what_changed_between_writing_and_checking_is_found(
@@ -207,6 +215,17 @@ def test_what_changed_between_writing_and_checking_is_found(
     monkeypatch.setattr(seal_run, "check_sealed", check)
     writer, _ = kit.begin(tmp_path, 3, [50] * 3)
     refused(writer, told)
+
+
+@pytest.mark.parametrize(("change", "told"), IN_TRIALS)
+def test_several_processes_find_the_same_changes(tmp_path, kit, monkeypatch, change, told):
+    for name in ("WORTHWHILE", "TOGETHER"):
+        monkeypatch.setattr(in_parts, name, 1)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(sealed_file, "_check_copy", None)  # nothing is checked in this process
+    test_what_changed_between_writing_and_checking_is_found(
+        tmp_path, kit, monkeypatch, change, told
+    )
 
 
 class Watched:

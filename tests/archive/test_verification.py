@@ -13,6 +13,7 @@ import pytest
 
 from campaign.archive import RunStatus, open_run
 from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.reading import in_parts
 from campaign.archive.verification import entries
 from campaign.archive.verification.result import STRUCTURE, UNFINISHED
 from campaign.archive.verification.verify_run import verify_run
@@ -89,7 +90,7 @@ def test_several_processes_find_what_one_does(described, monkeypatch, place, die
     # all but the hash of the file itself, and what is damaged
     assert alone.datasets == len(datasets(described)) - 1 - bool(place)
     for name in ("WORTHWHILE", "TOGETHER"):
-        monkeypatch.setattr(entries, name, 1)
+        monkeypatch.setattr(in_parts, name, 1)
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
     if dies:  # of whatever it is asked to do
         dead = Future()

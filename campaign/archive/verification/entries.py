@@ -1,23 +1,15 @@
-"""Verifying the trials of a run, in several processes for large runs.
-
-Parts are checked independently. Problems are returned in the order of the trials.
-"""
+"""Verifying the trials of a run."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
-from itertools import groupby, zip_longest
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 
 import h5py
 from h5py import h5o
 
-from campaign import processes
 from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.entries import entry_name
@@ -27,7 +19,7 @@ from campaign.archive.layout.record import Trees, TrialRecord, series_of
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_samples import TIME, PackedSamples
 from campaign.archive.reading.damage import DamageList
-from campaign.archive.reading.global_heap_check import add_known_heaps, known_heaps
+from campaign.archive.reading.in_parts import in_parts
 from campaign.archive.reading.packed_trial_reader import packed_record, read_packed
 from campaign.archive.reading.sealed_run import read_entry
 from campaign.archive.reading.series import series_at
@@ -41,13 +33,6 @@ from campaign.recording import ChannelInfo
 _MEMBERS = frozenset(("title", "start_time", "end_time", "record"))
 _PLOT = frozenset(("axes", "time_indices"))
 """Attributes that viewers need to plot a group, besides its signal."""
-
-
-PRELOADED = (__name__,)
-WORTHWHILE = 400
-"""Number of trials from which several processes save more time than their start takes."""
-TOGETHER = 50
-"""Number of trials of one part, checked by one process."""
 
 Entries = Sequence[tuple[str, TrialFinished]]
 """Names of groups in a sealed run, each with its line of the journal."""
@@ -230,28 +215,9 @@ class EntryCheck:
 
 def check_entries(check: EntryCheck, entries: Entries, progress: Progress) -> None:
     """Check trials of a sealed run, or the trial files of a folder; add the result to `check`."""
-    parts = [entries[start : start + TOGETHER] for start in range(0, len(entries), TOGETHER)]
-    for part_check in _checked(check.path, parts, len(entries) >= WORTHWHILE):
-        check.absorb(part_check)
-        progress(part_check.size)
-
-
-def _checked(path: Path, parts: Sequence[Entries], many: bool) -> Iterator[EntryCheck]:
-    """Checks of the parts, in order; a part whose process died is checked in this process."""
-    count = (os.cpu_count() or 1) if many else 1
-    if count == 1:
-        yield from (_check(path, part) for part in parts)
-        return
-    with processes.process_pool(count, PRELOADED, add_known_heaps, known_heaps()) as pool:
-        begun: list[Future[EntryCheck]] = []
-        with suppress(BrokenProcessPool):  # earlier futures stay
-            begun.extend(pool.submit(_check, path, part) for part in parts)
-        for part, future in zip_longest(parts, begun):
-            check = None
-            if future is not None:
-                with suppress(BrokenProcessPool):
-                    check = future.result()
-            yield check or _check(path, part)
+    for part in in_parts(_check, check.path, entries):
+        check.absorb(part)
+        progress(part.size)
 
 
 def _check(path: Path, part: Entries) -> EntryCheck:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 from h5py import h5d
@@ -27,6 +28,7 @@ from campaign.archive.layout.storage import storable
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_samples import TIME
 from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.in_parts import in_parts
 from campaign.archive.reading.packed_trial_reader import packed_record, read_packed
 from campaign.archive.reading.seal import SEAL, SealedTexts, seal_text
 from campaign.archive.reading.series import layout_of
@@ -41,6 +43,14 @@ from campaign.trial import Tree, canonical_json
 Placed = Mapping[tuple[str, str], tuple[str, tuple[Place, ...]]]
 """Unit and places of chunks of each series of a trial, by group and name."""
 Text = str | LongText | int
+
+
+class Copy(NamedTuple):
+    """A copied attempt: name of its group, line of the journal, and places of its samples."""
+
+    entry: str
+    finished: TrialFinished
+    placed: Placed
 
 
 class SealedFile:
@@ -172,19 +182,25 @@ def check_sealed(part: Path, file: SealedFile) -> None:
             raise ArchiveError(str(damaged.found[0]))
         for place in texts.seal.texts:
             texts.check(place)
-        for entry, finished in file.copied.items():
-            if entry not in file.not_kept:
-                with safe_hdf5.guarded(part, f"/{entry}"):
-                    _check_entry(safe_hdf5.inner_group(opened, entry), finished, file.placed[entry])
+    copies = [Copy(entry, file.copied[entry], placed) for entry, placed in file.placed.items()]
+    for _ in in_parts(_check_copies, part, copies):
+        pass
 
 
-def _check_entry(entry: h5py.Group, finished: TrialFinished, placed: Placed) -> None:
-    """Check record against journal, and places of samples. Raises ArchiveError."""
+def _check_copies(part: Path, copies: Sequence[Copy]) -> None:
+    """Check records against the journal, and places of samples. Raises ArchiveError."""
+    with safe_hdf5.open_file(part) as file:
+        for copy in copies:
+            with safe_hdf5.guarded(part, f"/{copy.entry}"):
+                _check_copy(safe_hdf5.inner_group(file, copy.entry), copy)
+
+
+def _check_copy(entry: h5py.Group, copy: Copy) -> None:
     kept = safe_hdf5.inner_group(entry, "record")
-    safe_hdf5.text_at(kept, "json", finished.record)
+    safe_hdf5.text_at(kept, "json", copy.finished.record)
     safe_hdf5.text_at(kept, "trees")
     inner = cache(partial(safe_hdf5.inner_group, entry))
-    for (group, name), (unit, layout) in placed.items():
+    for (group, name), (unit, layout) in copy.placed.items():
         series = h5d.open(inner(group).id, name.encode())
         if layout_of(series) != layout:
             place = f"{entry.file.filename}: {entry.name}/{group}/{name}"
