@@ -20,7 +20,7 @@ from campaign.archive.layout.journal import (
     TrialFinished,
     TrialMeasured,
 )
-from campaign.archive.layout.json_lines import parse_at_once
+from campaign.archive.layout.json_lines import line_places, parse_at_once
 from campaign.trial import Outcome
 
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
@@ -39,15 +39,15 @@ class Lines:
         damaged: numbers of the invalid lines, from 1.
         torn: whether the last line is incomplete; it was never reported, so it is no damage.
         content: the reported lines, damaged ones included.
-        measured: unparsed lines with metrics, by the digest of the trial's record; filled only in
-            lean reading, and then `entries` does not contain them.
+        measured: places in `content` of unparsed lines with metrics, by the digest of the trial's
+            record; filled only in lean reading, and then `entries` does not contain them.
     """
 
     entries: tuple[Entry, ...]
     damaged: tuple[int, ...]
     torn: bool
     content: bytes = field(repr=False)
-    measured: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    measured: Mapping[str, slice] = field(default_factory=dict, repr=False)
 
     @property
     def whole(self) -> bool:
@@ -87,7 +87,7 @@ class Lines:
 
     def measured_of(self, record: str) -> TrialMeasured | None:
         """The parsed line of `measured` for the digest of a record, or None."""
-        entry = _parse(self.measured.get(record, b""))
+        entry = _parse(self.content[self.measured.get(record, slice(0))])
         return entry if isinstance(entry, TrialMeasured) else None
 
     def all(self, kind: type[_Kind]) -> list[_Kind]:
@@ -100,24 +100,29 @@ def read_lines(content: bytes, *, lean: bool = False) -> Lines:
 
     `lean`: keep lines with metrics unparsed, which takes a tenth of the memory.
     """
-    *lines, rest = content.split(b"\n")
-    matches = [_MEASURED.search(line) if lean else None for line in lines]
-    left = {match[1].decode(): match.string for match in matches if match}
-    numbers = [number for number, match in enumerate(matches, start=1) if match is None]
-    to_parse = [lines[number - 1] for number in numbers]
-    together = parse_at_once(_ENTRIES, to_parse)
-    parsed: list[Entry | None] = list(together or map(_parse, to_parse))
-    entries = [entry for entry in parsed if entry is not None]
+    places = list(line_places(content))
+    measured: dict[str, slice] = {}
+    numbers = []
+    for number, place in enumerate(places, start=1):
+        match = _MEASURED.search(content, place.start, place.stop) if lean else None
+        if match is None:
+            numbers.append(number)
+        else:
+            measured[match[1].decode()] = place
+    to_parse = [content[places[number - 1]] for number in numbers]
+    parsed: list[Entry | None] = list(parse_at_once(_ENTRIES, to_parse) or map(_parse, to_parse))
     damaged = [number for number, entry in zip(numbers, parsed, strict=True) if entry is None]
-    torn = bool(rest)
-    if damaged and damaged[-1] == len(lines):  # a power cut may leave an invalid last line
-        lines, damaged, torn = lines[:-1], damaged[:-1], True
+    whole = len(places)
+    if damaged and damaged[-1] == whole:  # a power cut may leave an invalid last line
+        whole -= 1
+        damaged.pop()
+    end = places[whole - 1].stop + 1 if whole else 0
     return Lines(
-        entries=tuple(entries),
+        entries=tuple(entry for entry in parsed if entry is not None),
         damaged=tuple(damaged),
-        torn=torn,
-        content=b"".join(line + b"\n" for line in lines),
-        measured=left,
+        torn=end < len(content),
+        content=content[:end],
+        measured=measured,
     )
 
 

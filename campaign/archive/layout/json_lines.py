@@ -1,8 +1,8 @@
-"""Parsing of JSON lines together, several times as fast as line by line."""
+"""JSON lines: their places in a text, and parsing together, several times as fast as one by one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
@@ -11,6 +11,14 @@ Item = TypeVar("Item")
 
 TOGETHER = 2000
 """Lines per part; a part is in memory three times."""
+
+
+def line_places(text: bytes) -> Iterator[slice]:
+    """Places of the complete lines of a text, without their ends; no line is copied."""
+    start = 0
+    while (end := text.find(b"\n", start)) >= 0:
+        yield slice(start, end)
+        start = end + 1
 
 
 def parse_at_once(adapter: TypeAdapter[list[Item]], lines: Sequence[bytes]) -> list[Item] | None:

@@ -169,24 +169,40 @@ def raw_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> byt
 def check_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> None:
     """As `text_at`, in constant memory."""
     dataset = _text_id(parent, name)
-    offset, size = dataset.get_offset(), dataset.get_storage_size()
-    if offset is None:  # stored in the object header
+    if (place := _place_in_file(dataset)) is None:
         text_at(parent, name, digest)
     else:
-        path = Path(os.fsdecode(h5f.get_name(dataset)))
-        _compare(dataset, sha256_of_part(path, offset, size), digest)
+        _compare(dataset, sha256_of_part(*place), digest)
 
 
 def unchecked_text_at(parent: h5py.Group, name: str) -> str:
     """A text without a check; it may be damaged."""
-    return _raw_text(parent, name)[1].decode("utf-8", "replace")
+    return unchecked_raw_text_at(parent, name).decode("utf-8", "replace")
+
+
+def unchecked_raw_text_at(parent: h5py.Group, name: str) -> bytes:
+    """As `unchecked_text_at`, in UTF-8."""
+    return _raw_text(parent, name)[1]
 
 
 def _raw_text(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, bytes]:
     dataset = _text_id(parent, name)
-    value = np.empty((), dtype=dataset.dtype)
-    dataset.read(h5s.ALL, h5s.ALL, value)
-    return dataset, value.tobytes().rstrip(b"\0")  # one copy: an index may be large
+    if (place := _place_in_file(dataset)) is None:
+        value = np.empty((), dtype=dataset.dtype)
+        dataset.read(h5s.ALL, h5s.ALL, value)
+        return dataset, value.tobytes().rstrip(b"\0")
+    path, offset, size = place
+    with path.open("rb") as file:  # without HDF5's copy: an index may be large
+        file.seek(offset)
+        return dataset, file.read(size).rstrip(b"\0")
+
+
+def _place_in_file(dataset: h5d.DatasetID) -> tuple[Path, int, int] | None:
+    """File, offset and size (bytes) of a contiguous dataset; None if in its object header."""
+    offset = dataset.get_offset()
+    if offset is None:
+        return None
+    return Path(os.fsdecode(h5f.get_name(dataset))), offset, dataset.get_storage_size()
 
 
 def _text_id(parent: h5py.Group, name: str) -> h5d.DatasetID:

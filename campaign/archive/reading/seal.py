@@ -94,10 +94,10 @@ class SealedTexts:
             parent, name = self._parent(place)
             return safe_hdf5.raw_text_at(parent, name, self._digest(place))
 
-    def unchecked(self, place: str) -> str:
-        """A text of `/run` without a check; it may be damaged. Raises ArchiveError."""
+    def unchecked(self, place: str) -> bytes:
+        """A text of `/run` in UTF-8 without a check; it may be damaged. Raises ArchiveError."""
         with safe_hdf5.guarded(self._path, f"/run/{place}"):
-            return safe_hdf5.unchecked_text_at(*self._parent(place))
+            return safe_hdf5.unchecked_raw_text_at(*self._parent(place))
 
     def integer(self, place: str) -> int:
         """An integer of `/run`. Raises ArchiveError if it is damaged."""

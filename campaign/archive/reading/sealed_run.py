@@ -17,6 +17,7 @@ from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import RunStarted, TrialFinished
 from campaign.archive.layout.journal_summary import Lines, read_lines
+from campaign.archive.layout.json_lines import line_places
 from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
 from campaign.archive.layout.run_folder import parse_plan
@@ -32,6 +33,7 @@ from campaign.archive.reading.provenance import read_provenance
 from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
 from campaign.archive.reading.seal import SEAL, SealedTexts
 from campaign.errors import ArchiveError
+from campaign.gc_threshold import paused_collection
 from campaign.recording import Outcome, SafeState
 from campaign.trial import Tree
 
@@ -43,6 +45,7 @@ def read_sealed(path: Path) -> RunReader:
     """Read a sealed file of any name; samples are checked only when read."""
     damaged = DamageList(path)
     with (
+        paused_collection(),
         safe_hdf5.held_open(path),
         safe_hdf5.open_file(path) as file,
         safe_hdf5.guarded(path, "/run"),
@@ -177,8 +180,11 @@ class _Trials:
     Attributes:
         story: the journal.
         groups: names of the top-level members of the file.
-        lines: lines of the index, by digest.
+        index: the index.
+        lines: places of its lines, by digest.
         whole: whether the index is unchanged since sealing; it can then replace journal lines.
+        in_step: whether all texts are as sealed, and the index has exactly the records of the
+            journal, in the order of trials.
         trees: benches and options that are readable.
         not_kept: reason why samples are absent, by entry.
     """
@@ -186,8 +192,10 @@ class _Trials:
     path: Path
     story: Lines
     groups: frozenset[str]
-    lines: Mapping[str, bytes]
+    index: bytes
+    lines: Mapping[str, slice]
     whole: bool
+    in_step: bool
     trees: Trees
     not_kept: Mapping[str, str]
 
@@ -195,23 +203,28 @@ class _Trials:
     def read(
         cls, path: Path, texts: SealedTexts, story: Lines, file: h5py.File, damaged: DamageList
     ) -> _Trials:
-        index, whole = _text_or_rest(texts, "index/data", damaged)
-        trees, _ = _text_or_rest(texts, "trees/data", damaged)
-        lines = {sha256(line).hexdigest(): line for line in index.splitlines()}
+        index, trees = (_unchecked(texts, place) for place in ("index/data", "trees/data"))
+        _is_as_sealed(texts, "trees/data", damaged)
+        places = list(line_places(index))
+        digests = [sha256(memoryview(index)[place]).hexdigest() for place in places]
+        recorded = [each.record for each in entry_names(story.attempts).values()]
+        # The records of a sealed journal, in its order, are the whole index: no second check.
+        in_step = digests == recorded and story.whole and not damaged.found
+        whole = in_step or _is_as_sealed(texts, "index/data", damaged)
+        lines = dict(zip(digests, places, strict=True))
         not_kept: dict[str, str] = {}
         with damaged.noting(), safe_hdf5.guarded(path, "/run/not_kept"):
             not_kept = read_not_kept(texts)
         groups = frozenset(safe_hdf5.names(file))
-        return cls(path, story, groups, lines, whole, _good_trees(trees), not_kept)
+        return cls(path, story, groups, index, lines, whole, in_step, _good_trees(trees), not_kept)
 
     def archived(
         self, plan: Sequence[PlannedTrial], damaged: DamageList
     ) -> tuple[LazyTrials, dict[int, tuple[ArchivedTrial, ...]]]:
         """The last attempts, and the earlier attempts by trial number; damage is noted.
 
-        If all texts are as sealed, and the index has the records of the journal in the order of
-        trials, outlines come from plan and journal. Otherwise each record is parsed once, which
-        detects its damage, and is not kept.
+        If the index is in step, outlines come from plan and journal. Otherwise each record is
+        parsed once, which detects its damage, and is not kept.
         """
         outlines: list[Outline] = []
         kept: dict[int, TrialFinished] = {}
@@ -221,9 +234,7 @@ class _Trials:
         if unknown:
             damaged.add("/run/index", f"has {unknown} records that are not in the journal")
         names = entry_names(attempts)
-        sound = self.whole and self.story.whole and not damaged.found
-        sound = sound and [each.record for each in names.values()] == list(self.lines)
-        planned = {each.number: each for each in plan} if sound else {}
+        planned = {each.number: each for each in plan} if self.in_step else {}
         for entry, finished in names.items():
             last = entry == entry_name(finished.trial)
             present = entry in self.groups or entry in self.not_kept
@@ -253,17 +264,18 @@ class _Trials:
         if self.whole and not self.story.whole:
             known = {each.record for each in attempts.values()}
             for digest in self.lines.keys() - known:
-                finished = _as_finished(parse_record(self.path, "/run/index", self.lines[digest]))
+                line = self.index[self.lines[digest]]
+                finished = _as_finished(parse_record(self.path, "/run/index", line))
                 attempts.setdefault((finished.trial, finished.attempt), finished)
         return list(attempts.values())
 
     def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
         """A trial; record and trees come from its own group if the index lacks them."""
         trees: Trees = self.trees
-        if (line := self.lines.get(told.record)) is not None:
-            record = parse_record(self.path, f"/{entry}", line)
+        if (place := self.lines.get(told.record)) is not None:
+            record = parse_record(self.path, f"/{entry}", self.index[place])
             check_identity(self.path, entry, record, told)
-        if line is None or not record.tree_names <= trees.keys():
+        if place is None or not record.tree_names <= trees.keys():
             with safe_hdf5.open_file(self.path) as file:
                 record, trees = read_entry(self.path, file, entry, told)
         # Samples that are present are checked against the record, even if listed as not kept.
@@ -330,13 +342,17 @@ def _good_trees(raw: bytes) -> Trees:
     return trees
 
 
-def _text_or_rest(texts: SealedTexts, place: str, damaged: DamageList) -> tuple[bytes, bool]:
-    """A text, and whether it is as sealed; damage is noted."""
+def _unchecked(texts: SealedTexts, place: str) -> bytes:
+    """A text that may be damaged; empty if it cannot be read."""
     try:
-        return texts.raw(place), True
-    except ArchiveError as error:
-        damaged.note(error)
-    try:
-        return texts.unchecked(place).encode(), False
+        return texts.unchecked(place)
     except ArchiveError:
-        return b"", False
+        return b""
+
+
+def _is_as_sealed(texts: SealedTexts, place: str, damaged: DamageList) -> bool:
+    """Whether a text is as sealed; damage is noted."""
+    known = len(damaged.found)
+    with damaged.noting():
+        texts.check(place)
+    return len(damaged.found) == known
