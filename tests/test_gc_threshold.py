@@ -15,7 +15,7 @@ def test_a_pause_ends_with_its_block_also_after_an_error(enabled: bool) -> None:
     try:
         (gc.enable if enabled else gc.disable)()
         with pytest.raises(ZeroDivisionError), paused_collection():
-            1 / gc.isenabled()  # noqa: B018
+            1 / gc.isenabled()
         assert gc.isenabled() is enabled
     finally:
         (gc.enable if before else gc.disable)()
