@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from campaign.archive import PlannedTrial, RunHeader, RunReader
-from campaign.archive.layout.journal import Decision, TrialFinished, parse_journal
+from campaign.archive.layout.journal import Decision, TrialFinished
 from campaign.archive.writing.resume_run import RESUMABLE
 from campaign.errors import ArchiveError, UsageError
 from campaign.execution.provenance import shaping
@@ -83,7 +83,7 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
 def _skipped(run: RunReader) -> Iterator[int]:
     """Numbers of the trials that the policy skipped after their last attempt."""
     skipped: dict[int, bool] = {}
-    for entry in parse_journal(run.path, run.story.content).entries:
+    for entry in run.story.entries:
         if isinstance(entry, TrialFinished):
             skipped[entry.trial] = False
         elif isinstance(entry, Decision) and entry.trial is not None and entry.decision == "skip":

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import ArchivedTrial, open_run
-from campaign.archive.layout.journal import read_journal
+from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.reading.folder import read_trial_file
 from campaign.archive.reading.packed_trial_reader import read_packed
 from campaign.archive.writing import trial_writer
@@ -195,7 +195,7 @@ def test_series_of_one_trial_may_have_chunks_of_different_lengths(tmp_path, kit,
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     journal.write_text(journal.read_text().replace(writer._last[1].sha256, digest))
     sealer = SealedFile(tmp_path / "sealed.part")
-    sealer.copy(writer.folder, read_journal(journal).files[0], "trial_00001")
+    sealer.copy(writer.folder, read_journal(journal).attempts[0], "trial_00001")
     assert sealer._file["trial_00001/data"][first["name"]][:].tobytes() == samples.tobytes()
     sealer.discard()
 

@@ -20,8 +20,8 @@ from campaign.archive.layout.journal import (
     Decision,
     OperatorStep,
     RunResumed,
-    read_journal,
 )
+from campaign.archive.layout.journal_summary import read_journal
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Ending, Fault, Outcome, SafeState
 from tests.archive.conftest import RESUMED

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.layout.journal import JOURNAL, read_journal
+from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.sealed_file import SealedFile
 from campaign.backends.sim import CHANNELS
@@ -231,7 +232,7 @@ def one(tmp_path, kit) -> tuple[Path, SealedFile, list]:
     """A folder of two finished trials, and a sealed file that was begun beside it."""
     writer, _ = kit.begin(tmp_path, 2, [40] * 2)
     writer.close()
-    attempts = list(read_journal(writer.folder / JOURNAL).files)
+    attempts = list(read_journal(writer.folder / JOURNAL).attempts)
     return writer.folder, SealedFile(tmp_path / "new.part"), attempts
 
 

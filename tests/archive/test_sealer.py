@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from campaign.archive import RunWriter
-from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
+from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.layout.run_folder import SEALING
 from campaign.archive.writing import seal_run
 from campaign.archive.writing.sealed_file import SealedFile
@@ -31,7 +32,7 @@ def writer(tmp_path: Path, kit) -> Iterator[RunWriter]:
 
 @pytest.fixture
 def attempts(writer: RunWriter) -> list[TrialFinished]:
-    return list(read_journal(writer.folder / JOURNAL).files)
+    return list(read_journal(writer.folder / JOURNAL).attempts)
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.header import PARTIAL
-from campaign.archive.layout.journal import JOURNAL, read_journal
+from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.layout.run_folder import SEALING
 from campaign.archive.reading import in_parts
 from campaign.archive.reading.series import Series
@@ -470,7 +471,7 @@ def test_a_sealer_may_be_discarded_and_begun_again(tmp_path, kit, monkeypatch):
     assert not [name for name in open_files(writer.folder) if SEALING in name]
     sealer = seal_run.Sealer(writer.folder)
     watched = Watched(monkeypatch)
-    sealer.add(*read_journal(writer.folder / JOURNAL).files)
+    sealer.add(*read_journal(writer.folder / JOURNAL).attempts)
     sealer.advance()
     sealer.discard()
     assert watched.beside == ALL[:1]

@@ -6,7 +6,8 @@ import pytest
 
 from campaign.archive import RunStatus, RunWriter, list_runs, open_run
 from campaign.archive.layout.followup_trials import stages_in, trials_followed, trials_in
-from campaign.archive.layout.journal import JOURNAL, TrialsFollowed, read_journal
+from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome

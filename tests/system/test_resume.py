@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import open_run
-from campaign.archive.layout.journal import Decision, RunResumed, parse_journal
+from campaign.archive.layout.journal import Decision, RunResumed
 from campaign.archive.layout.run_folder import PLAN
 from campaign.archive.writing.unseal_run import unseal
 from campaign.backends.serial import SerialOptions
@@ -127,7 +127,7 @@ def test_what_has_changed_is_named_by_field_and_refused_unless_accepted(
     assert "--accept-changes" in str(refused.value)
     assert archive.read_bytes() == before, "a refused resume touches nothing"
     assert lab.resume(archive, accept=True) is ExitCode.DONE
-    story = parse_journal(archive, open_run(archive).journal.encode())
+    story = open_run(archive).story
     (resumed,) = [entry for entry in story.entries if isinstance(entry, RunResumed)]
     assert len(resumed.changes) == 1
 
@@ -167,7 +167,7 @@ def test_a_fault_is_repeated_when_it_ended_the_run_and_not_when_it_was_skipped(
         assert status == "failed trials"
         with pytest.raises(UsageError, match="failed trials"):
             lab.resume(archive)
-    story = parse_journal(archive, open_run(archive).journal.encode())
+    story = open_run(archive).story
     decisions = [entry.decision for entry in story.entries if isinstance(entry, Decision)]
     assert decisions == [policy]
 

@@ -6,12 +6,9 @@ the last line; a truncated line was never reported, so a reader skips it.
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import threading
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import accumulate
 from pathlib import Path
@@ -22,7 +19,6 @@ from pydantic import (
     ConfigDict,
     Field,
     TypeAdapter,
-    ValidationError,
     field_serializer,
 )
 
@@ -257,99 +253,3 @@ class Journal:
             if self._descriptor >= 0:
                 os.close(self._descriptor)
                 self._descriptor = -1
-
-
-@dataclass(frozen=True)
-class Story:
-    """Content of a journal.
-
-    Attributes:
-        started: its first line.
-        finished: the last attempt of each trial, by trial number, in their order.
-        earlier: by trial number, the attempts before the last one, in their order.
-        ended: None if the run is in progress or was killed.
-        entries: all lines in order, without the metrics, which take most of the memory.
-        measured: offsets of the lines with metrics, by the digest of the trial's record.
-        size: size of the complete lines (bytes).
-    """
-
-    started: RunStarted
-    finished: dict[int, TrialFinished]
-    earlier: dict[int, tuple[TrialFinished, ...]]
-    ended: RunEnded | None
-    entries: tuple[Entry, ...]
-    measured: dict[str, int]
-    size: int
-
-    @property
-    def files(self) -> list[TrialFinished]:
-        """All attempts, in the order of trial numbers."""
-        kept = self.finished.items()
-        return [one for number, last in kept for one in (*self.earlier.get(number, ()), last)]
-
-
-def read_journal(path: Path) -> Story:
-    """Read a journal. Raises ArchiveError with the number of an invalid line."""
-    try:
-        with path.open("rb") as file:
-            return _tell(path, file)
-    except OSError as error:
-        raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def parse_journal(path: Path, content: bytes) -> Story:
-    """Parse a journal; `path` is for messages."""
-    return _tell(path, io.BytesIO(content))
-
-
-def _tell(path: Path, lines: Iterable[bytes]) -> Story:
-    entries: list[Entry] = []
-    attempts: dict[int, dict[str, TrialFinished]] = {}
-    measured: dict[str, int] = {}
-    size = 0
-    for entry, length in _parse(path, lines):
-        if isinstance(entry, TrialMeasured):
-            measured[entry.record] = size
-        else:
-            entries.append(entry)
-        if isinstance(entry, TrialFinished):
-            of_trial = attempts.setdefault(entry.trial, {})
-            of_trial.pop(entry.file, None)
-            of_trial[entry.file] = entry
-        size += length
-    if not entries or not isinstance(entries[0], RunStarted):
-        raise ArchiveError(f"{path}: does not begin with the start of a run")
-    kept = {number: list(attempts[number].values()) for number in sorted(attempts)}
-    return Story(
-        started=entries[0],
-        finished={number: of_trial[-1] for number, of_trial in kept.items()},
-        earlier={n: tuple(of_trial[:-1]) for n, of_trial in kept.items() if len(of_trial) > 1},
-        ended=_end(entries),
-        entries=tuple(entries),
-        measured=measured,
-        size=size,
-    )
-
-
-def _end(entries: list[Entry]) -> RunEnded | None:
-    """The end of the run; None if there is none or the run was resumed later."""
-    for entry in reversed(entries):
-        if isinstance(entry, RunEnded):
-            return entry
-        if isinstance(entry, RunResumed):
-            return None
-    return None
-
-
-def _parse(path: Path, lines: Iterable[bytes]) -> Iterator[tuple[Entry, int]]:
-    """Each line, and its size in bytes."""
-    wrong = 0
-    for number, line in enumerate(lines, start=1):
-        if not line.endswith(b"\n"):
-            return  # a truncated line was never reported
-        if wrong:  # a power cut may leave an invalid last line, but no other one
-            raise ArchiveError(f"{path}:{wrong}: is not a line of a journal")
-        try:
-            yield _ENTRY.validate_python(json.loads(line)), len(line)
-        except (ValidationError, ValueError, RecursionError):
-            wrong = number

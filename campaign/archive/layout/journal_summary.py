@@ -6,8 +6,9 @@ import json
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
@@ -21,6 +22,7 @@ from campaign.archive.layout.journal import (
     TrialMeasured,
 )
 from campaign.archive.layout.json_lines import line_places, parse_at_once
+from campaign.errors import ArchiveError
 from campaign.trial import Outcome
 
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
@@ -38,22 +40,28 @@ class Lines:
         entries: the valid lines, in order.
         damaged: numbers of the invalid lines, from 1.
         torn: whether the last line is incomplete; it was never reported, so it is no damage.
-        content: the reported lines, damaged ones included.
-        measured: places in `content` of unparsed lines with metrics, by the digest of the trial's
+        size: of the reported lines (bytes), damaged ones included.
+        content: the reported lines; empty from `read_journal`.
+        measured: places (bytes) of unparsed lines with metrics, by the digest of the trial's
             record; filled only in lean reading, and then `entries` does not contain them.
     """
 
     entries: tuple[Entry, ...]
     damaged: tuple[int, ...]
     torn: bool
+    size: int
     content: bytes = field(repr=False)
     measured: Mapping[str, slice] = field(default_factory=dict, repr=False)
 
     @property
+    def begins(self) -> bool:
+        """Whether the first line is the start of a run."""
+        return bool(self.entries) and isinstance(self.entries[0], RunStarted)
+
+    @property
     def whole(self) -> bool:
-        """Whether the first line is the start of a run, and all lines are complete and valid."""
-        begins = bool(self.entries) and isinstance(self.entries[0], RunStarted)
-        return begins and not self.damaged and not self.torn
+        """Whether it begins with the start of a run, and all lines are complete and valid."""
+        return self.begins and not self.damaged and not self.torn
 
     @property
     def text(self) -> str:
@@ -63,7 +71,7 @@ class Lines:
     @cached_property
     def finished(self) -> dict[int, TrialFinished]:
         """The last attempt of each trial, by trial number, in their order."""
-        return dict(sorted({e.trial: e for e in self.all(TrialFinished)}.items()))
+        return dict(sorted({e.trial: e for e in self.attempts}.items()))
 
     @property
     def interrupted(self) -> int:
@@ -72,8 +80,12 @@ class Lines:
 
     @cached_property
     def attempts(self) -> list[TrialFinished]:
-        """All finished attempts, in the order of finishing; repeated lines count once."""
-        return list({(e.trial, e.attempt): e for e in self.all(TrialFinished)}.values())
+        """All finished attempts, in the order of finishing; of repeated lines the last counts."""
+        attempts: dict[tuple[int, int], TrialFinished] = {}
+        for each in self.all(TrialFinished):
+            attempts.pop((each.trial, each.attempt), None)
+            attempts[each.trial, each.attempt] = each
+        return list(attempts.values())
 
     @property
     def ended(self) -> RunEnded | None:
@@ -93,6 +105,19 @@ class Lines:
     def all(self, kind: type[_Kind]) -> list[_Kind]:
         """The lines of one kind."""
         return [entry for entry in self.entries if isinstance(entry, kind)]
+
+
+def read_journal(path: Path) -> Lines:
+    """Read the journal of a folder without metrics. Raises ArchiveError with an invalid line."""
+    try:
+        lines = read_lines(path.read_bytes(), lean=True)
+    except OSError as error:
+        raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
+    for number in lines.damaged:
+        raise ArchiveError(f"{path}:{number}: is not a line of a journal")
+    if not lines.begins:
+        raise ArchiveError(f"{path}: does not begin with the start of a run")
+    return replace(lines, content=b"")
 
 
 def read_lines(content: bytes, *, lean: bool = False) -> Lines:
@@ -121,6 +146,7 @@ def read_lines(content: bytes, *, lean: bool = False) -> Lines:
         entries=tuple(entry for entry in parsed if entry is not None),
         damaged=tuple(damaged),
         torn=end < len(content),
+        size=end,
         content=content[:end],
         measured=measured,
     )

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from campaign.archive.layout.files import PART, sha256_of, why
 from campaign.archive.layout.header import PARTIAL, SEALED, RunStatus
-from campaign.archive.layout.journal import JOURNAL, Journal, Story, read_journal
+from campaign.archive.layout.journal import JOURNAL, Journal
+from campaign.archive.layout.journal_summary import Lines, read_journal
 from campaign.archive.layout.run_folder import read_header
 from campaign.archive.layout.signature_file import set_aside_signature
 from campaign.archive.reading.open_run import read_sealed
@@ -20,7 +21,7 @@ RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
 """Statuses of a run that can be resumed."""
 
 
-def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
+def reopen(path: Path) -> tuple[Path, Lines, Journal, RunLock]:
     """The folder of the run at `path`, the content of its journal, the journal, and the lock.
 
     A folder of a process killed during sealing may be reopened with any status.
@@ -73,11 +74,11 @@ def _check_sealed(sealed: Path) -> None:
         )
 
 
-def _read_folder(folder: Path) -> Story:
+def _read_folder(folder: Path) -> Lines:
     """Check the files of the folder and read its journal. Raises ArchiveError with the file."""
     read_header(folder)  # raises if the format is another
     story = read_journal(folder / JOURNAL)
-    for finished in story.files:
+    for finished in story.attempts:
         path = folder / finished.file
         try:
             digest = sha256_of(path)

@@ -15,7 +15,8 @@ from pathlib import Path
 from campaign.archive.layout.entries import entry_name, entry_names
 from campaign.archive.layout.files import publish, why
 from campaign.archive.layout.header import SEALED
-from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
+from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.layout.run_folder import SEALING, read_header
 from campaign.archive.writing.remnants import remove_folder
 from campaign.archive.writing.sealed_file import SealedFile, check_sealed
@@ -39,7 +40,7 @@ def seal_folder(folder: Path, begun: SealedFile | None = None) -> Path:
         story = read_journal(folder / JOURNAL)
         if story.ended is None:
             raise ArchiveError(f"{folder / JOURNAL}: the run has not ended")
-        wanted = entry_names(story.files)
+        wanted = entry_names(story.attempts)
         if begun is not None and not begun.is_part_of(wanted):
             begun.discard()
             begun = None

@@ -20,7 +20,8 @@ from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
-from campaign.archive.layout.journal import JOURNAL, RunEnded, Story, TrialFinished
+from campaign.archive.layout.journal import JOURNAL, RunEnded, TrialFinished
+from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.layout.packed_trial import Place
 from campaign.archive.layout.record import TrialRecord, parse_trees, series_of
 from campaign.archive.layout.run_folder import PLAN, parse_plan, read_text
@@ -103,7 +104,7 @@ class SealedFile:
             self._trees.setdefault(digest, line)
         self.copied[entry] = finished
 
-    def finish(self, folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> None:
+    def finish(self, folder: Path, header: RunHeader, story: Lines, ended: RunEnded) -> None:
         """Write everything except the trials, and close the file."""
         texts = _texts(folder, header, story, ended)
         planned = read_text(folder / PLAN_TREES)
@@ -212,7 +213,7 @@ def _digest(text: Text) -> str:
     return text.sha256 if isinstance(text, LongText) else text_digest(storable(str(text)))
 
 
-def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> dict[str, Text]:
+def _texts(folder: Path, header: RunHeader, story: Lines, ended: RunEnded) -> dict[str, Text]:
     """The texts of `/run` that do not depend on the trials, by their place."""
     failed = sum(f.outcome is not Outcome.COMPLETED for f in story.finished.values())
     texts: dict[str, Text] = {
@@ -295,7 +296,7 @@ def _write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None
 
 
 def _shown(
-    file: h5py.File, placed: Collection[str], folder: Path, story: Story
+    file: h5py.File, placed: Collection[str], folder: Path, story: Lines
 ) -> h5py.Group | None:
     """The entry that a viewer opens first: see `default_plot`."""
     completed = [n for n, each in story.finished.items() if each.outcome is Outcome.COMPLETED]

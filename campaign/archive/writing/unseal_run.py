@@ -26,7 +26,7 @@ from campaign.archive.layout.files import (
 )
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import PARTIAL
-from campaign.archive.layout.journal import JOURNAL, TrialFinished, parse_journal
+from campaign.archive.layout.journal import JOURNAL, TrialFinished
 from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees, trees_text
 from campaign.archive.layout.run_folder import HEADER, PLAN, header_document
@@ -91,12 +91,11 @@ def _fill(sealed: Path, folder: Path) -> None:
         for name, note in notes.items():
             write_atomically(folder / name, texts.text(f"{note}/data"))
         write_atomically(folder / HEADER, header_document(run.header))
-        story = parse_journal(sealed, run.story.content)
         lines = {text_digest(line): line for line in texts.text("index/data").splitlines()}
         trees = parse_trees(texts.text("trees/data"))
         not_kept = read_not_kept(texts)
         written = {}
-        for entry, finished in entry_names(story.files).items():
+        for entry, finished in entry_names(run.story.attempts).items():
             if entry in not_kept:
                 packed = _without_samples(lines[finished.record], trees, not_kept[entry])
             else:

@@ -116,9 +116,9 @@ class RunWriter:
         folder, story, journal, lock = reopen(path)
         writer = cls(folder, journal, lock)
         writer._last = dict(story.finished)
-        for finished in story.files:
+        for finished in story.attempts:
             writer._sealer.add(finished)
-        writer._measured = story.measured
+        writer._measured = {digest: line.start for digest, line in story.measured.items()}
         try:
             journal.append(
                 RunResumed(
