@@ -172,7 +172,7 @@ def _docstrings(owner: type) -> Mapping[str, str]:
 
 def _within(found: tuple[Any, ...], prefix: str) -> Iterator[OptionInfo]:
     """The options of all tables that a field accepts."""
-    tables = {word: table for table in _tables(found) for word in [_told_by(table)]}
+    tables = {word: table for table in _tables(found) for word in [_tag(table)]}
     for choice in found:
         if isinstance(choice, Choice):
             chosen = {f"{choice.tag} = {word}": choice.options(word) for word in choice.words()}
@@ -247,10 +247,10 @@ def _tables(types: tuple[Any, ...]) -> list[type[BaseModel]]:
 
 def _alternatives(tables: list[type[BaseModel]]) -> str:
     """The words that identify the tables."""
-    return " | ".join(map(_told_by, tables))
+    return " | ".join(map(_tag, tables))
 
 
-def _told_by(table: type[BaseModel]) -> str:
+def _tag(table: type[BaseModel]) -> str:
     """Word that identifies a table: of its first field with exactly one allowed word."""
     for name, field in table.model_fields.items():
         allowed = get_args(field.annotation)

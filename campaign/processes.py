@@ -66,13 +66,13 @@ def new_pool(
 
 @contextmanager
 def process_pool(
-    count: int, preload: Iterable[str], begin: Callable[[Any], object], told: object
+    count: int, preload: Iterable[str], begin: Callable[[Any], object], argument: object
 ) -> Iterator[ProcessPoolExecutor]:
-    """Pool whose processes have called `begin(told)`; an exception in the block ends them."""
+    """Pool whose processes have called `begin(argument)`; an exception in the block ends them."""
     start_preloading(preload)
     others = set(multiprocessing.active_children())
     # Pickled once for all of them.
-    handed = pickle.dumps((begin, told), pickle.HIGHEST_PROTOCOL)
+    handed = pickle.dumps((begin, argument), pickle.HIGHEST_PROTOCOL)
     pool = new_pool(count, process_context(preload), _begin, (handed,))
     try:
         yield pool

@@ -9,7 +9,7 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
-from campaign.api.damage_warnings import tell
+from campaign.api.damage_warnings import report_damage
 from campaign.api.results import Results
 from campaign.api.run import RunView
 from campaign.api.test import TestView
@@ -39,5 +39,5 @@ def open_view(
     """
     name = None if run is None else str(run)
     view = RunView(open_run(find_run(Path(results), name)), strict, measure_anew)
-    tell(view.path, view.damaged, strict=strict)
+    report_damage(view.path, view.damaged, strict=strict)
     return view

@@ -16,7 +16,7 @@ from campaign.errors import ArchiveError, ArchiveWarning
 _PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 
-def tell(path: Path, damaged: Sequence[Damage], *, strict: bool) -> None:
+def report_damage(path: Path, damaged: Sequence[Damage], *, strict: bool) -> None:
     """Warn of damage of the run at `path`; if `strict`, raise ArchiveError instead."""
     if not damaged:
         return

@@ -20,7 +20,7 @@ from campaign.api.analysis import (
     source_of,
     title_of,
 )
-from campaign.api.damage_warnings import tell, warn
+from campaign.api.damage_warnings import report_damage, warn
 from campaign.api.estimates import findings_table
 from campaign.api.plots import plot
 from campaign.api.tables import result_table
@@ -207,7 +207,7 @@ def _kept(run: RunReader, *, strict: bool, measure_anew: bool) -> tuple[RunResul
 def _analysed(run: RunReader, *, strict: bool, measure_anew: bool) -> RunResults:
     tests = analyse_run(run, experiments(), measure_anew=measure_anew)
     left_out = dict.fromkeys(d for test in tests for d in test.damaged if _is_new(d, run))
-    tell(run.path, tuple(left_out), strict=strict)
+    report_damage(run.path, tuple(left_out), strict=strict)
     scoreboard = score(published_of(run), [test.evidence() for test in tests])
     return results_of(run, tests, scoreboard, measured_anew=measure_anew)
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from campaign.api.damage_warnings import tell
+from campaign.api.damage_warnings import report_damage
 from campaign.api.estimates import findings_table, metrics_table
 from campaign.api.tables import result_table, trials_table
 from campaign.api.trial import TrialView
@@ -83,7 +83,7 @@ class TestView:
         result, _, detected = without_damaged(self.run, trials, analyse)
         damaged = tuple(dict.fromkeys((*self.damaged, *detected)))
         left_out = [damage for damage in damaged if damage.trial]
-        tell(self.run, left_out, strict=self.strict)
+        report_damage(self.run, left_out, strict=self.strict)
         return result, damaged
 
     @property

@@ -52,13 +52,13 @@ class Heartbeat:
 
     Attributes:
         interval: s between two signs.
-        tell: receiver; called with False for the last sign before a pause.
+        send: receiver; called with False for the last sign before a pause.
     """
 
     interval = 0.5
 
     def __init__(self) -> None:
-        self.tell: Callable[[bool], None] = lambda more: None
+        self.send: Callable[[bool], None] = lambda more: None
         self._loops, self._due = 0, 0.0
         self._counting = threading.Lock()
 
@@ -67,21 +67,21 @@ class Heartbeat:
         """Expect calls of `beat` inside the block."""
         with self._counting:
             self._loops += 1
-            self.tell(True)
+            self.send(True)
         try:
             yield
         finally:
             with self._counting:
                 self._loops -= 1
                 if not self._loops:
-                    self.tell(False)
+                    self.send(False)
 
     def beat(self) -> None:
         """Called in each cycle of a loop; sends a sign if it is due."""
         now = time.monotonic()
         if now >= self._due:
             self._due = now + self.interval
-            self.tell(True)
+            self.send(True)
 
 
 HEARTBEAT = Heartbeat()

@@ -257,7 +257,7 @@ def _differences(archived: Mapping[str, Any], wanted: Mapping[str, Any]) -> list
     """Differences as `path: archived value there, wanted value here`; task before bench."""
     leaves = dict(_leaves(archived))
     differing = [
-        f"{path}: {_told(leaves.get(path, _ABSENT))} there, {_told(wanted.get(path, _ABSENT))} here"
+        f"{path}: {_text(leaves.get(path, _ABSENT))} there, {_text(wanted.get(path, _ABSENT))} here"
         for path in dict.fromkeys((*leaves, *wanted))
         if leaves.get(path, _ABSENT) != wanted.get(path, _ABSENT)
     ]
@@ -272,7 +272,7 @@ def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield f"{prefix}{key}", value
 
 
-def _told(value: object) -> str:
+def _text(value: object) -> str:
     text = "absent" if value is _ABSENT else canonical_json(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

@@ -190,7 +190,7 @@ class SimBackend:
             stretch = samples_at_a_time(half[0].grid, alone=len(half) == 1)
             halves = self.timing.each(Work.ENGINE, simulate_together(half, stretch))
         going = {
-            place: self._begun(lane, recorder, stop, told=not trial.truth)
+            place: self._begun(lane, recorder, stop, internal=not trial.truth)
             for place, (trial, lane, recorder, stop) in enumerate(
                 zip(trials, lanes, recorders, stops, strict=True)
             )
@@ -207,11 +207,13 @@ class SimBackend:
                 return
 
     def _begun(
-        self, lane: Lane, recorder: Recorder, stop: StopFlag, *, told: bool
+        self, lane: Lane, recorder: Recorder, stop: StopFlag, *, internal: bool
     ) -> SimulatedTrial:
         check = StepCheck(lane.grid.step, OUTPUTS) if self._options.check_step else None
         samples = lane.grid.samples
-        return SimulatedTrial(lane.stated, lane.task, samples, recorder, stop, check, told=told)
+        return SimulatedTrial(
+            lane.stated, lane.task, samples, recorder, stop, check, internal=internal
+        )
 
     def make_safe(self) -> SafeState:
         """Confirm: a simulation moves nothing."""

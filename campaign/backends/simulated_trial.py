@@ -82,13 +82,13 @@ class SimulatedTrial:
         stop: StopFlag,
         check: StepCheck | None = None,
         *,
-        told: bool = True,
+        internal: bool = True,
     ) -> None:
         """Begin a trial of the stated `bench` (not its truth).
 
         Args:
             samples: number of samples of the whole trial.
-            told: whether channels that only a simulation provides are recorded, too.
+            internal: whether channels that only a simulation provides are recorded, too.
         """
         self._bench = bench
         self._task = task
@@ -96,7 +96,7 @@ class SimulatedTrial:
         self._check = check
         self._recorder = recorder
         self._stop = stop
-        channels = CHANNELS if told else MEASURED
+        channels = CHANNELS if internal else MEASURED
         self._rows = [CHANNELS.index(channel) for channel in channels]
         names = [channel.name for channel in channels]
         self._watch = LimitWatch(bench.limits, task.sample_rate, names, bench.sides)

@@ -72,9 +72,9 @@ def execute_once(trial: Trial, conditions: Conditions) -> AttemptEnd:
 def execute_together(
     trials: Sequence[Trial],
     conditions: Conditions,
-    tell: Callable[[Trial, AttemptEnd], None],
+    on_end: Callable[[Trial, AttemptEnd], None],
 ) -> None:
-    """Execute `trials` once, together; call `tell` for each after it is archived.
+    """Execute `trials` once, together; call `on_end` for each after it is archived.
 
     For backends that move nothing and are `ExecutesTogether`. Raises only errors of the archive.
     """
@@ -82,20 +82,20 @@ def execute_together(
     if not isinstance(backend, ExecutesTogether):
         raise TypeError("this backend executes one trial at a time")
     with conditions.supervision.timing.span(Work.SAMPLES):
-        _execute_together(trials, backend, conditions, tell)
+        _execute_together(trials, backend, conditions, on_end)
 
 
 def _execute_together(
     trials: Sequence[Trial],
     backend: ExecutesTogether,
     conditions: Conditions,
-    tell: Callable[[Trial, AttemptEnd], None],
+    on_end: Callable[[Trial, AttemptEnd], None],
 ) -> None:
     attempts = dict(enumerate(_Attempt.begin(trial, conditions) for trial in trials))
 
     def end(place: int, executed: AttemptEnd) -> None:
         attempt = attempts.pop(place)
-        tell(attempt.trial, attempt.archive(attempt.concluded(executed)))
+        on_end(attempt.trial, attempt.archive(attempt.concluded(executed)))
 
     recorders = [attempt.recorder for attempt in attempts.values()]
     stops = [attempt.stop for attempt in attempts.values()]

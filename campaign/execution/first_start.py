@@ -32,26 +32,26 @@ from campaign.physics.machine_code import (
 from campaign.protocol.bench_file import load_bench
 from campaign.resources import shipped_benches
 
-Told = Callable[[CompiledPart], None]
+OnPart = Callable[[CompiledPart], None]
 LONGEST = 600.0
 """s; time limit of the compilation, also for a busy machine."""
 
 
-def make_all(told: Told, helpers: Helpers | None = None) -> None:
+def make_all(on_part: OnPart, helpers: Helpers | None = None) -> None:
     """Load or compile all machine code that the shipped benches need.
 
-    `told` is called for each part when it is ready, with its times in the process that compiled it.
+    Call `on_part` for each part when it is ready, with its times in the process that compiled it.
     """
     benches = _benches()
     first, *others = WIDTHS
     for part in parts(first, benches):
-        told(make(part))
+        on_part(make(part))
     note_made(first)
     elsewhere = helpers.wait() if helpers is not None else {}
     for width in others:
         for part in parts(width, benches):
             loaded = make(part)
-            told(elsewhere.get(loaded.name, loaded))
+            on_part(elsewhere.get(loaded.name, loaded))
         note_made(width)
 
 

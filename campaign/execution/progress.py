@@ -83,7 +83,7 @@ class Ledger:
         self._display = display
         self._running: dict[int, Trial] = {}
         self._reached: dict[int, float] = {}
-        self._told = 0.0
+        self._last_report = 0.0
         self._outcomes: dict[Outcome, int] = dict(Counter(finished.values()))
         self._started = time.monotonic()
 
@@ -108,7 +108,7 @@ class Ledger:
         for trial in trials:
             self._running[trial.number] = trial
             self._reached[trial.number] = 0.0
-        self._tell(None)
+        self._report(None)
 
     def reached(
         self, trial: Trial, channels: tuple[ChannelInfo, ...], time: Array, block: Array
@@ -119,8 +119,8 @@ class Ledger:
 
     def look(self) -> None:
         """Update the display if the running trials have progressed."""
-        if self._running and self._of_running() > self._told:
-            self._tell(None)
+        if self._running and self._of_running() > self._last_report:
+            self._report(None)
 
     def end(self, trial: Trial, ending: Ending) -> None:
         """Count a trial that has ended and is archived."""
@@ -131,7 +131,7 @@ class Ledger:
         self._bench_time_left -= trial.task.duration
         self._worth_done += self._worth(trial)
         self._worth_left -= self._worth(trial)
-        self._tell((trial, ending))
+        self._report((trial, ending))
 
     def take_back(self, trial: Trial) -> None:
         """Uncount a completed trial that is executed again."""
@@ -145,20 +145,20 @@ class Ledger:
         """Note the end of an attempt; the trial will be executed again."""
         self._running.pop(trial.number, None)
         self._reached.pop(trial.number, None)
-        self._tell((trial, ending))
+        self._report((trial, ending))
 
     def remark(self, text: str) -> None:
         """Display a decision of the run."""
-        self._tell(None, remark=text)
+        self._report(None, remark=text)
 
     def close(self) -> None:
         """Display that the archive is being closed, after all trials."""
-        self._tell(None, closing=True)
+        self._report(None, closing=True)
 
-    def _tell(
+    def _report(
         self, ended: tuple[Trial, Ending] | None, remark: str = "", *, closing: bool = False
     ) -> None:
-        self._told = running = self._of_running()
+        self._last_report = running = self._of_running()
         shares = {
             number: self._reached.get(number, 0.0) / trial.task.duration
             for number, trial in self._running.items()

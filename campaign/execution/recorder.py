@@ -24,8 +24,8 @@ from campaign.execution.sample_checks import (
     Verdict,
     announced,
     make_watch,
+    mentions_gaps,
     shaped,
-    tells_of_gaps,
     undefined,
     wrong_time,
 )
@@ -191,7 +191,7 @@ class SupervisingRecorder:
                 self._lost += good
             self._file.append(time, samples)
             self._samples += good
-            self._tell(time, samples)
+            self._publish(time, samples)
         self.heard = self._supervision.clock()  # the disk's time is not the bench's
 
     def _note(self, event: Event) -> None:
@@ -261,7 +261,7 @@ class SupervisingRecorder:
     def _say(self, verdict: Verdict) -> None:
         self._said.setdefault(verdict.kind, verdict)
 
-    def _tell(self, time: Array, block: Array) -> None:
+    def _publish(self, time: Array, block: Array) -> None:
         for subscriber in tuple(self._subscribers):
             try:
                 subscriber(self._trial, self._channels or (), time, block)
@@ -319,7 +319,7 @@ class SupervisingRecorder:
     def _judged(self, ending: Ending) -> dict[str, JsonValue]:
         """Violations of an existing recording that it does not report itself, by kind."""
         texts = [ending.reason, *(event.text for event in self._events)]
-        known = {"undefined"} if tells_of_gaps(ending, texts) else set[str]()
+        known = {"undefined"} if mentions_gaps(ending, texts) else set[str]()
         if ending.outcome is not Outcome.COMPLETED:  # its last sample is the evidence of that
             known |= {kind for kind, each in self._said.items() if self._is_last(each)}
         judged: dict[str, JsonValue] = {}

@@ -89,11 +89,11 @@ def safe_when_broken_off(backend: Backend) -> Iterator[None]:
 
 
 @contextmanager
-def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend]:
+def connected(backend: Backend, report: Callable[[str], None]) -> Iterator[Backend]:
     """Connect the backend, and disconnect it after the block.
 
     Raises BackendError if disconnecting fails. If the block raised as well, its error is raised,
-    and `tell` is called with the error of disconnecting.
+    and `report` is called with the error of disconnecting.
     """
     try:
         calls.connect(backend)
@@ -106,7 +106,7 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
         try:
             calls.leave(backend, error)
         except Exception as second:  # noqa: BLE001 - the first error is the cause
-            tell(f"and {LET_GO}: {describe(second)}")
+            report(f"and {LET_GO}: {describe(second)}")
         raise
     try:
         calls.leave(backend, None)

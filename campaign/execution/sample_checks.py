@@ -162,8 +162,8 @@ def undefined(names: Sequence[str], time: Array, block: Array) -> tuple[int, Ver
     return index, Verdict("undefined", Outcome.DIVERGED, reason, float(time[index]))
 
 
-def tells_of_gaps(ending: Ending, told: Sequence[str]) -> bool:
+def mentions_gaps(ending: Ending, texts: Sequence[str]) -> bool:
     """Whether a recording itself reports undefined samples."""
     if ending.outcome is Outcome.DIVERGED or ending.fault is Fault.LOST_SAMPLES:
         return True
-    return any("were lost and are NaN" in text for text in told)
+    return any("were lost and are NaN" in text for text in texts)

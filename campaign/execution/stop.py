@@ -58,12 +58,12 @@ class GuardianPipes:
 
     Attributes:
         come, back: read and write end of one pipe: signals to this program, also from itself.
-        tell: write end of the pipe to the guardian.
+        to_guardian: write end of the pipe to the guardian.
     """
 
     come: int
     back: int
-    tell: int
+    to_guardian: int
 
 
 def under_guardian(kind: BackendKind) -> GuardianPipes | None:
@@ -76,9 +76,9 @@ def under_guardian(kind: BackendKind) -> GuardianPipes | None:
         return None
     if given := os.environ.pop(VARIABLE, ""):
         pipes = GuardianPipes(*map(int, given.split(",")))
-        for end in (pipes.come, pipes.back, pipes.tell):
+        for end in (pipes.come, pipes.back, pipes.to_guardian):
             os.set_inheritable(end, False)
-        os.set_blocking(pipes.tell, False)  # POSIX: no other system has a guardian
+        os.set_blocking(pipes.to_guardian, False)  # POSIX: no other system has a guardian
         return pipes
     if interrupts.is_program():
         _begin_anew(kind)
@@ -140,8 +140,8 @@ class StopSwitch:
         """
         self._note, self._moves = note, moves
         text = f"{NOT_SAFE if moves else ''}\n{note()}".strip()
-        self._tell_text(NOTE, text)
-        self._tell_text(STOPPER, "\0".join(stopper))
+        self._send_text(NOTE, text)
+        self._send_text(STOPPER, "\0".join(stopper))
 
     @contextmanager
     def on_signals(self) -> Iterator[StopSwitch]:
@@ -157,13 +157,13 @@ class StopSwitch:
             stack.callback(watcher.join, _ENDING if guardian else None)
             stack.callback(os.close, back)  # ends the watcher
             if guardian:
-                self._tell_text(NOTE, NOT_SAFE)  # until more is known
-                self._tell(bytes((CONNECTED,)))
-                stack.callback(self._tell, bytes((LEAVING,)))
-                HEARTBEAT.tell = lambda more: self._tell(bytes((BEAT if more else REST,)))
+                self._send_text(NOTE, NOT_SAFE)  # until more is known
+                self._send(bytes((CONNECTED,)))
+                stack.callback(self._send, bytes((LEAVING,)))
+                HEARTBEAT.send = lambda more: self._send(bytes((BEAT if more else REST,)))
             if os.name == "posix":
                 os.set_blocking(back, False)
-                to = guardian.tell if guardian else back
+                to = guardian.to_guardian if guardian else back
                 before_it = signal.set_wakeup_fd(to, warn_on_full_buffer=False)
                 stack.callback(signal.set_wakeup_fd, before_it)
 
@@ -180,14 +180,14 @@ class StopSwitch:
                     if handler is not None:  # None: not set from Python, not restorable
                         signal.signal(number, handler)
 
-    def _tell_text(self, kind: int, text: str) -> None:
+    def _send_text(self, kind: int, text: str) -> None:
         data = text.encode(errors="replace")[:_LONGEST]
-        self._tell(bytes((kind,)) + len(data).to_bytes(2) + data)
+        self._send(bytes((kind,)) + len(data).to_bytes(2) + data)
 
-    def _tell(self, data: bytes) -> None:
+    def _send(self, data: bytes) -> None:
         if self._guardian is not None:
             try:
-                os.write(self._guardian.tell, data)
+                os.write(self._guardian.to_guardian, data)
             except BrokenPipeError:
                 self.request("the death of its guardian process")
             except OSError:
@@ -214,7 +214,7 @@ class StopSwitch:
 
     def _leave(self) -> NoReturn:
         """Abort: make the bench safe, print the last message, exit."""
-        self._tell(bytes((MAKING_SAFE,)))
+        self._send(bytes((MAKING_SAFE,)))
         code = self.make_safe()
         unsafe = code is ExitCode.NOT_SAFE
         state = f"{NOT_SAFE if unsafe else SAFE}\n" if unsafe or self._moves else ""
@@ -224,7 +224,7 @@ class StopSwitch:
         except OSError as error:  # the disk of the results is gone
             note = f"what was kept cannot be looked at: {error}"
         _say(f"{cursor}\n{state}{note}\n")
-        self._tell(bytes((LEAVING,)))
+        self._send(bytes((LEAVING,)))
         os._exit(code)
 
 

@@ -24,7 +24,7 @@ from campaign.trial import Task
 Array = NDArray[np.float64]
 
 _LOOP = {"form": "parallel", "proportional": 1.0, "integral": 0.0}
-_NOBODYS: Mapping[str, Any] = {
+_BARE_BENCH: Mapping[str, Any] = {
     "name": "friction alone",
     "axis": {"name": "none", "inertia": 1.0},
     "motor": {
@@ -48,7 +48,7 @@ class Along:
     def __init__(self, task: Task) -> None:
         """task: prescribed rate in rad/s (or m/s); a step is one sample at most."""
         self._count = round(task.duration * task.sample_rate)
-        self._met = FrictionAlong(_nobody(), task, 1.0 / task.sample_rate)
+        self._met = FrictionAlong(_bare_bench(), task, 1.0 / task.sample_rate)
 
     @classmethod
     def rates(cls, rates: Array, sample_rate: float, start: float = 0.0) -> Along:
@@ -84,8 +84,8 @@ def _task(command: Polyline | Sine, count: int, sample_rate: float, start: float
 
 
 @cache
-def _nobody() -> CompleteBench:
-    return complete(Bench.model_validate(_NOBODYS, context={"si": True}))
+def _bare_bench() -> CompleteBench:
+    return complete(Bench.model_validate(_BARE_BENCH, context={"si": True}))
 
 
 @cache

@@ -10,7 +10,7 @@ from nexusformat.nexus import nxload
 
 from campaign.archive import PlannedTrial, RunStatus, RunWriter
 from campaign.archive.verification.verify_run import verify_run
-from campaign.archive.writing.default_plot import telling_trial
+from campaign.archive.writing.default_plot import leading_trial
 from campaign.backends.sim import CHANNELS
 from campaign.recording import Ending, Outcome
 from campaign.signals import Sine
@@ -71,13 +71,13 @@ M, W, C = Role.MEASUREMENT, Role.WARM_UP, Role.CHECK
 )
 def test_the_middle_completed_measurement_of_the_first_test(plan, completed, expected):
     trials = planned(*plan)
-    assert telling_trial(trials, completed, [each.number for each in trials]) == expected
+    assert leading_trial(trials, completed, [each.number for each in trials]) == expected
 
 
 def test_a_trial_without_samples_is_never_opened():
     trials = planned(("a", M), ("a", M), ("a", M))
-    assert telling_trial(trials, {1, 2, 3}, [3]) == 3
-    assert telling_trial(trials, {1, 2, 3}, []) is None
+    assert leading_trial(trials, {1, 2, 3}, [3]) == 3
+    assert leading_trial(trials, {1, 2, 3}, []) is None
 
 
 @pytest.mark.parametrize(

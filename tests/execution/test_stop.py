@@ -236,8 +236,8 @@ class FakeGuardian:
 def guardian() -> Iterator[FakeGuardian]:
     one = FakeGuardian()
     yield one
-    HEARTBEAT.tell = lambda more: None
-    for end in (one.back, one.told, one.pipes.tell):
+    HEARTBEAT.send = lambda more: None
+    for end in (one.back, one.told, one.pipes.to_guardian):
         with suppress(OSError):
             os.close(end)
 

@@ -127,7 +127,7 @@ def test_a_good_live_trial_is_left_alone(lab: Callable[..., Lab]) -> None:
 def signs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Signs of life as they are sent: whether another one follows."""
     sent: list[bool] = []
-    monkeypatch.setattr(HEARTBEAT, "tell", sent.append)
+    monkeypatch.setattr(HEARTBEAT, "send", sent.append)
     monkeypatch.setattr(HEARTBEAT, "interval", 0.0)
     return sent
 
@@ -161,7 +161,7 @@ def test_so_does_one_that_waits_for_an_answer(
 def test_signs_of_life_end_with_the_last_loop_and_are_not_sent_at_every_turn() -> None:
     sent: list[bool] = []
     one = Heartbeat()
-    one.tell, one.interval = sent.append, LONG
+    one.send, one.interval = sent.append, LONG
     with one.expected():
         with one.expected():
             for _ in range(3):

@@ -53,9 +53,9 @@ def measured_in(entries: Iterable[Entry]) -> dict[str, TrialMeasured]:
     return {entry.record: entry for entry in entries if isinstance(entry, TrialMeasured)}
 
 
-def with_metrics(archived: ArchivedTrial, told: TrialMeasured | None) -> ArchivedTrial:
+def with_metrics(archived: ArchivedTrial, measured: TrialMeasured | None) -> ArchivedTrial:
     """The trial with its metrics, if any."""
-    if told is None:
+    if measured is None:
         return archived
-    estimates = (*archived.estimates, *told.estimates)
-    return replace(archived, estimates=estimates, measured_by=told.by)
+    estimates = (*archived.estimates, *measured.estimates)
+    return replace(archived, estimates=estimates, measured_by=measured.by)

@@ -165,25 +165,25 @@ class _Named(Protocol):
     def name(self) -> str: ...
 
 
-_Told = TypeVar("_Told", bound=_Named)
+NamedT = TypeVar("NamedT", bound=_Named)
 
 
-class LazyChannels(Mapping[str, Channel], Generic[_Told]):
+class LazyChannels(Mapping[str, Channel], Generic[NamedT]):
     """Channels by name; the samples of each are read once, on first access.
 
     `read` reads the given channels, one after another; it raises ArchiveError.
     """
 
     def __init__(
-        self, told: Iterable[_Told], read: Callable[[Iterable[_Told]], Iterator[Channel]]
+        self, entries: Iterable[NamedT], read: Callable[[Iterable[NamedT]], Iterator[Channel]]
     ) -> None:
         self._read_from = read
-        self._told = {channel.name: channel for channel in told}
+        self._entries = {channel.name: channel for channel in entries}
         self._read: dict[str, Channel] = {}
 
     def __getitem__(self, name: str) -> Channel:
         if name not in self._read:
-            (self._read[name],) = self._read_from([self._told[name]])
+            (self._read[name],) = self._read_from([self._entries[name]])
         return self._read[name]
 
     def values(self) -> ValuesView[Channel]:
@@ -196,18 +196,18 @@ class LazyChannels(Mapping[str, Channel], Generic[_Told]):
 
     def _read_all(self) -> None:
         """Read the remaining channels; opens the file once."""
-        left = [entry for name, entry in self._told.items() if name not in self._read]
+        left = [entry for name, entry in self._entries.items() if name not in self._read]
         if left:
             self._read |= {channel.name: channel for channel in self._read_from(left)}
 
     def __contains__(self, name: object) -> bool:
-        return name in self._told
+        return name in self._entries
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._told)
+        return iter(self._entries)
 
     def __len__(self) -> int:
-        return len(self._told)
+        return len(self._entries)
 
 
 def archived_trial(samples: RecordedSamples, trees: Trees) -> ArchivedTrial:

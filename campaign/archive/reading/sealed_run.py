@@ -229,7 +229,7 @@ class _Trials:
         outlines: list[Outline] = []
         kept: dict[int, TrialFinished] = {}
         earlier: dict[int, list[ArchivedTrial]] = {}
-        attempts = self._told()
+        attempts = self._attempts()
         unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
         if unknown:
             damaged.add("/run/index", f"has {unknown} records that are not in the journal")
@@ -258,7 +258,7 @@ class _Trials:
         with safe_hdf5.guarded(self.path, f"/{entry}"):
             return self._archived(entry, kept[number])
 
-    def _told(self) -> list[TrialFinished]:
+    def _attempts(self) -> list[TrialFinished]:
         """Finished attempts of the journal; the index replaces lost lines."""
         attempts = {(each.trial, each.attempt): each for each in self.story.attempts}
         if self.whole and not self.story.whole:
@@ -269,15 +269,15 @@ class _Trials:
                 attempts.setdefault((finished.trial, finished.attempt), finished)
         return list(attempts.values())
 
-    def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
+    def _archived(self, entry: str, finished: TrialFinished) -> ArchivedTrial:
         """A trial; record and trees come from its own group if the index lacks them."""
         trees: Trees = self.trees
-        if (place := self.lines.get(told.record)) is not None:
+        if (place := self.lines.get(finished.record)) is not None:
             record = parse_record(self.path, f"/{entry}", self.index[place])
-            check_identity(self.path, entry, record, told)
+            check_identity(self.path, entry, record, finished)
         if place is None or not record.tree_names <= trees.keys():
             with safe_hdf5.open_file(self.path) as file:
-                record, trees = read_entry(self.path, file, entry, told)
+                record, trees = read_entry(self.path, file, entry, finished)
         # Samples that are present are checked against the record, even if listed as not kept.
         not_kept = "" if entry in self.groups else self.not_kept.get(entry, "")
         if entry not in self.groups and not not_kept:
@@ -285,7 +285,7 @@ class _Trials:
                 f"{self.path}: /{entry}: is missing, and the journal says that it finished"
             )
         archived = archived_trial(RecordedSamples(self.path, entry, record, not_kept), trees)
-        return with_metrics(archived, self.story.measured_of(told.record))
+        return with_metrics(archived, self.story.measured_of(finished.record))
 
 
 def _as_finished(record: TrialRecord) -> TrialFinished:
@@ -304,22 +304,22 @@ def _as_finished(record: TrialRecord) -> TrialFinished:
     )
 
 
-def check_identity(path: Path, entry: str, record: TrialRecord, told: TrialFinished) -> None:
+def check_identity(path: Path, entry: str, record: TrialRecord, finished: TrialFinished) -> None:
     """Raise ArchiveError if a record is not of the trial and attempt that the journal names."""
-    if (record.number, record.attempt) != (told.trial, told.attempt):
+    if (record.number, record.attempt) != (finished.trial, finished.attempt):
         raise ArchiveError(f"{path}: /{entry}: is not the trial that the journal names")
 
 
 def read_entry(
-    path: Path, file: h5py.File, name: str, told: TrialFinished
+    path: Path, file: h5py.File, name: str, finished: TrialFinished
 ) -> tuple[TrialRecord, Trees]:
     """Record and trees from the group of a trial. Raises ArchiveError."""
     with safe_hdf5.guarded(path, f"/{name}"):
         entry = safe_hdf5.inner_group(file, name)
         kept = safe_hdf5.inner_group(entry, "record")
         record, trees = (safe_hdf5.unchecked_text_at(kept, text) for text in ("json", "trees"))
-        parsed = packed_record(path, name, PackedTrial(record=record, trees=trees), told.record)
-        check_identity(path, name, parsed[0], told)
+        parsed = packed_record(path, name, PackedTrial(record=record, trees=trees), finished.record)
+        check_identity(path, name, parsed[0], finished)
         return parsed
 
 

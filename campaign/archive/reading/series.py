@@ -120,17 +120,17 @@ def dataset_series(
     return Series(length, chunk, shuffled, packed, lambda: _place(parent, name))
 
 
-def file_series(file: BinaryIO, place: str, length: int, told: PackedSeries) -> Series:
+def file_series(file: BinaryIO, place: str, length: int, stored: PackedSeries) -> Series:
     """A series of a trial's own file."""
 
     def packed(number: int) -> bytes | None:
-        offset, size = told.chunks[number]
+        offset, size = stored.chunks[number]
         file.seek(offset)
         return file.read(size)
 
-    if len(told.chunks) != -(-length // told.chunk):
-        raise ArchiveError(f"{place}: has {len(told.chunks)} chunks of {told.chunk} samples")
-    return Series(length, told.chunk, told.shuffled, packed, lambda: place)
+    if len(stored.chunks) != -(-length // stored.chunk):
+        raise ArchiveError(f"{place}: has {len(stored.chunks)} chunks of {stored.chunk} samples")
+    return Series(length, stored.chunk, stored.shuffled, packed, lambda: place)
 
 
 def layout_of(dataset: h5d.DatasetID) -> tuple[Place, ...]:

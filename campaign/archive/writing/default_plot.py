@@ -82,7 +82,7 @@ def beside(shown: ChannelInfo, channels: Iterable[ChannelInfo]) -> list[str]:
     return [name for name in same if name != shown.name]
 
 
-def telling_trial(
+def leading_trial(
     plan: Iterable[PlannedTrial], completed: Collection[int], with_samples: Sequence[int]
 ) -> int | None:
     """Number of the trial that viewers open first.

@@ -27,7 +27,7 @@ def put_table(parent: h5py.Group, name: str, table: Table, signal: str = "") -> 
     names = names_of([INDEX, *(column.name for column in table.columns)])[1:]
     cells = {c.name: [row.get(c.name) for row in table.rows] for c in table.columns}
     numeric = [c for c in table.columns if _is_numeric(cells[c.name])]
-    shown = next(iter(sorted(numeric, key=lambda c: _telling(c, cells[c.name], signal))), None)
+    shown = next(iter(sorted(numeric, key=lambda c: _rank(c, cells[c.name], signal))), None)
     group = hdf5.make_group(parent, name, "NXcollection" if shown is None else "NXdata")
     hdf5.put_text(group, "title", table.title)
     hdf5.put_attribute(group, "note", table.note)
@@ -84,9 +84,9 @@ def _put_column(
     group: h5py.Group, name: str, column: Column, cells: Sequence[Cell], numeric: bool
 ) -> None:
     if numeric:
-        hdf5.put_series(group, name, _numbers(map(bare, cells)), **_told_of(column))
+        hdf5.put_series(group, name, _numbers(map(bare, cells)), **_labels(column))
     else:
-        hdf5.put_texts(group, name, [_text(bare(cell)) for cell in cells], **_told_of(column))
+        hdf5.put_texts(group, name, [_text(bare(cell)) for cell in cells], **_labels(column))
 
 
 def _put_intervals(group: h5py.Group, name: str, column: Column, cells: Sequence[Cell]) -> None:
@@ -99,17 +99,17 @@ def _put_intervals(group: h5py.Group, name: str, column: Column, cells: Sequence
     parts = {"errors": half, "low": low, "high": high}
     for ending, values in parts.items():
         if values is not None and np.isfinite(values).any():
-            attributes = _told_of(column, f", {INTERVAL[ending]}")
+            attributes = _labels(column, f", {INTERVAL[ending]}")
             hdf5.put_series(group, unused(f"{name}_{ending}", group), values, **attributes)
 
 
-def _told_of(column: Column, more: str = "") -> dict[str, str]:
+def _labels(column: Column, more: str = "") -> dict[str, str]:
     unit = f" ({column.unit})" if column.unit else ""
     units = {"units": column.unit, "display_units": column.display or column.unit}
     return {"long_name": f"{column.label}{more}{unit}", **(units if unit else {})}
 
 
-def _telling(column: Column, cells: Sequence[Cell], signal: str) -> int:
+def _rank(column: Column, cells: Sequence[Cell], signal: str) -> int:
     """Rank of a column as the default plot; 0 is best."""
     if column.name == signal:
         return 0

@@ -237,22 +237,22 @@ class _Writer:
         group.attrs[f"{x_name}_indices"] = np.array([0], dtype="<i4")
         _put_scales(group, panel)
         at = "; ".join(f"{place:g}: {name}" for place, name in panel.x.places)
-        hdf5.put_series(group, x_name, plot.x, **_told_of(panel.x, f" ({at})" if at else ""))
+        hdf5.put_series(group, x_name, plot.x, **_labels(panel.x, f" ({at})" if at else ""))
         if together is not None:
-            hdf5.put_series(group, whole, together.y, **_told_of(panel.y))
+            hdf5.put_series(group, whole, together.y, **_labels(panel.y))
             for ending, values, _ in parts_of(together):
                 part = f"{whole}_{ending}"
-                hdf5.put_series(group, part, values, **_told_of(panel.y, f", {INTERVAL[ending]}"))
+                hdf5.put_series(group, part, values, **_labels(panel.y, f", {INTERVAL[ending]}"))
         for own, curve, start in plot.curves:
             cut = _cut(curve, plot, start)
-            attributes = _told_of(panel.y, _which(curve, plot))
+            attributes = _labels(panel.y, _which(curve, plot))
             hdf5.put_series(group, own, plot.spread(_floats(curve.y), start), **attributes)
             self.places[id(curve.x)] = f"{inside}{name}/{x_name}{cut}"
             self.places[id(curve.y)] = f"{inside}{name}/{own}{cut}"
         for own, curve, start in plot.curves:
             for ending, values, array in parts_of(curve):
                 part = unused(f"{own}_{ending}", group)
-                attributes = _told_of(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
+                attributes = _labels(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
                 hdf5.put_series(group, part, plot.spread(values, start), **attributes)
                 if array is not None:
                     self.places[id(array)] = f"{inside}{name}/{part}{_cut(curve, plot, start)}"
@@ -301,7 +301,7 @@ def _put_scales(group: h5py.Group, panel: Panel) -> None:
         hdf5.put_attribute(group, "SILX_style", style)
 
 
-def _told_of(axis: Axis, more: str = "") -> dict[str, str]:
+def _labels(axis: Axis, more: str = "") -> dict[str, str]:
     """Attributes of a series along an axis: name, SI unit, unit for display."""
     unit = f" ({axis.unit})" if axis.unit else ""
     units = {"units": axis.unit, "display_units": axis.display or axis.unit} if axis.unit else {}

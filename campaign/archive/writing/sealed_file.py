@@ -34,7 +34,7 @@ from campaign.archive.reading.packed_trial_reader import packed_record, read_pac
 from campaign.archive.reading.seal import SEAL, SealedTexts, seal_text
 from campaign.archive.reading.series import layout_of
 from campaign.archive.writing import hdf5, nexus
-from campaign.archive.writing.default_plot import telling_trial
+from campaign.archive.writing.default_plot import leading_trial
 from campaign.archive.writing.long_text import LongText, file_pieces, text_of
 from campaign.archive.writing.sealed_entry import EntryWriter
 from campaign.errors import ArchiveError
@@ -309,5 +309,5 @@ def _shown(
         return None
     plan = parse_plan(folder, read_text(folder / PLAN))
     followed = planned_in(stages_in(story.entries))
-    best = telling_trial((*plan, *followed), completed, with_samples)
+    best = leading_trial((*plan, *followed), completed, with_samples)
     return None if best is None else file[entry_name(best)]

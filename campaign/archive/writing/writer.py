@@ -185,7 +185,7 @@ class RunWriter:
             finished = self._last[number]
             place = self._measured.get(finished.record)
         archived = read_trial_file(self._folder / finished.file, finished)
-        return with_metrics(archived, self._told(place))
+        return with_metrics(archived, self._metrics_at(place))
 
     def metrics(self) -> dict[int, tuple[Estimate, ...]]:
         """Metrics of the last finished attempt at each trial, by number."""
@@ -193,10 +193,10 @@ class RunWriter:
             places = {
                 number: self._measured.get(last.record) for number, last in self._last.items()
             }
-        lines = ((number, self._told(place)) for number, place in places.items())
+        lines = ((number, self._metrics_at(place)) for number, place in places.items())
         return {number: each.estimates for number, each in lines if each is not None}
 
-    def _told(self, place: int | None) -> TrialMeasured | None:
+    def _metrics_at(self, place: int | None) -> TrialMeasured | None:
         """Metrics at an offset of the journal; not cached, because all would fill the memory."""
         entry = None if place is None else self._journal.entry(place)
         return entry if isinstance(entry, TrialMeasured) else None

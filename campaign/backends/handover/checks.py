@@ -50,7 +50,7 @@ RATES = (RELATIVE_RATE, GYRO_RATE)
 TORQUES = (DRIVE_TORQUE, MOTOR_CURRENT, JOINT_TORQUE)
 
 
-Told = Callable[[str, float], str]
+Shown = Callable[[str, float], str]
 """Formats a value (SI) of a channel, such as `5 deg/s`."""
 
 
@@ -83,7 +83,7 @@ def wrong_length(task: Task, samples: int, stopped: bool) -> RecordingProblem | 
 
 
 def wrong_start(
-    task: Task, angle: Array, within: float, told: Told = plain
+    task: Task, angle: Array, within: float, shown: Shown = plain
 ) -> RecordingProblem | None:
     """Check the start angle: `angle` (n,) as recorded, `within` its tolerance."""
     off = float(angle[0]) - task.start_angle
@@ -91,14 +91,14 @@ def wrong_start(
         return None
     return RecordingProblem(
         "another place",
-        f"{RELATIVE_ANGLE} begins at {told(RELATIVE_ANGLE, float(angle[0]))} instead of "
-        f"{told(RELATIVE_ANGLE, task.start_angle)}; 'offset' of its column is for an encoder that "
+        f"{RELATIVE_ANGLE} begins at {shown(RELATIVE_ANGLE, float(angle[0]))} instead of "
+        f"{shown(RELATIVE_ANGLE, task.start_angle)}; 'offset' of its column is for an encoder that "
         "has its zero elsewhere",
     )
 
 
 def wrong_command(
-    got: Array, asked: Array, rate: float, others: Mapping[str, Array], told: Told = plain
+    got: Array, asked: Array, rate: float, others: Mapping[str, Array], shown: Shown = plain
 ) -> RecordingProblem | None:
     """Compare a recorded command with the requested one; both (n,), at `rate` (Hz).
 
@@ -111,7 +111,7 @@ def wrong_command(
         if worst <= TOLERANCE * largest or worst == 0.0:
             return None
         return RecordingProblem(
-            "another command", f"nothing was to be commanded, and {told(COMMAND, worst)} was"
+            "another command", f"nothing was to be commanded, and {shown(COMMAND, worst)} was"
         )
     if _off(got, asked) <= TOLERANCE:
         return None
@@ -137,8 +137,8 @@ def wrong_command(
     first = int(np.argmax(off > 10 * TOLERANCE * size)) or int(np.argmax(off))
     return RecordingProblem(
         "another command",
-        f"the command is {told(COMMAND, float(got[first]))} instead of "
-        f"{told(COMMAND, float(asked[first]))} at {first / rate:.4g} s, "
+        f"the command is {shown(COMMAND, float(got[first]))} instead of "
+        f"{shown(COMMAND, float(asked[first]))} at {first / rate:.4g} s, "
         f"and off by {_off(got, asked):.0%} of its size in all",
     )
 
@@ -167,7 +167,7 @@ def clipped(
     series: Mapping[str, Array],
     asked: Array,
     limits: Mapping[str, float],
-    told: Told = plain,
+    shown: Shown = plain,
 ) -> RecordingProblem | None:
     """Detect a torque or current that stays at an extreme value, but should have changed.
 
@@ -189,7 +189,7 @@ def clipped(
             if abs(level) >= AT_LIMIT * limits.get(name, np.inf):
                 continue
             stays = (
-                f"{name} stays at {told(name, float(level))} for {count} of {len(values)} samples"
+                f"{name} stays at {shown(name, float(level))} for {count} of {len(values)} samples"
             )
             return RecordingProblem("clipped", f"{stays}, while the trial goes on")
     return None
