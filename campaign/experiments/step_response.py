@@ -19,8 +19,9 @@ from campaign.estimation.step_response import (
     StepCharacteristics,
     step_characteristics,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, key, metrics
+from campaign.experiments.interface import Experiment, TestData, TrialData, key, metrics, validated
 from campaign.experiments.shared import default_options
+from campaign.experiments.shared.captions import duration
 from campaign.experiments.shared.common import conditions, grouped, method_label, swept
 from campaign.experiments.shared.detected_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
@@ -140,7 +141,7 @@ def _answer(trial: Trial) -> Window:
 def _options(trial: Trial) -> StepResponseOptions:
     """Options of a trial. Raises ValueError with a message for the user if of another test."""
     try:
-        return StepResponseOptions.model_validate(trial.options, context={"si": True})
+        return validated(StepResponseOptions, trial.options)
     except ValidationError as error:
         wrong = ", ".join(str(each["loc"][0]) for each in error.errors() if each["loc"])
         raise ValueError(f"these options fit no step response: {wrong}") from None
@@ -373,7 +374,7 @@ def _marks(step: Step) -> Iterator[Mark]:
     rise, settled, over = (step.value(name) for name in ("rise_time", "settling_time", "overshoot"))
     if math.isfinite(rise + step.rise_from):
         start = step.rise_from
-        yield Mark(f"rise {_time(rise)}", x=start, until=start + rise, series=step.series)
+        yield Mark(f"rise {duration(rise)}", x=start, until=start + rise, series=step.series)
     if over > 0:
         # Only after the step: noise before it may be as large.
         share = np.where(step.time >= 0, step.rate / step.options.step, np.nan)
@@ -382,11 +383,7 @@ def _marks(step: Step) -> Iterator[Mark]:
         x, y = float(step.time[peak]), float(step.rate[peak])
         yield Mark(label, x=x, y=y, point=True, series=step.series)
     if math.isfinite(settled):
-        yield Mark(f"settled {_time(settled)}", x=settled, series=step.series)
-
-
-def _time(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+        yield Mark(f"settled {duration(settled)}", x=settled, series=step.series)
 
 
 EXPERIMENT = Experiment(

@@ -62,10 +62,6 @@ class Instruments:
     estimates: dict[str, Estimate]
     delay: Estimate | None
 
-    def strength(self, index: int) -> float:
-        """F of the first stage of a term, by its index."""
-        return float(self.found.strength[index])
-
 
 def instruments(
     pieces: Sequence[MotionPiece],

@@ -19,7 +19,7 @@ from campaign.experiments import force_rate, friction_lag, stribeck_curve
 from campaign.experiments.interface import Experiment, TrialData
 from campaign.experiments.model_properties.parameter_set import Scale
 from campaign.experiments.model_properties.rules import CLOSES, LOSS, REVERSIBLE
-from campaign.experiments.presliding_hysteresis import Loop
+from campaign.experiments.presliding_hysteresis import loop_sizes
 from campaign.experiments.stick_slip import EXPERIMENT as STICK_SLIP
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -224,7 +224,7 @@ def presliding_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
         around = slice(ends[1] + max(int(below[0]) - 1, 0), ends[1] + int(below[0]) + 1)
         zero = float(np.interp(0.0, torque[around][::-1], x[around][::-1]))
     loop = slice(ends[1], ends[3] + 1)
-    loss = Loop(x[loop], torque[loop]).sizes(amplitude)["loss_factor"]
+    loss = loop_sizes(x[loop], torque[loop], amplitude)["loss_factor"]
     missed = abs(float(torque[ends[7]] - torque[ends[5]])) / max(outer, 1e-12)
     return {
         "reversible_share": max(1.0 - zero / amplitude, 0.0),

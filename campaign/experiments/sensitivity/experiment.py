@@ -18,7 +18,7 @@ from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.stabilization_error import over_trials
 from campaign.estimation.threshold import Threshold
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key, validated
 from campaign.experiments.sensitivity.model_variation import model_figures, model_trials
 from campaign.experiments.sensitivity.results import (
     SYMBOLS,
@@ -158,7 +158,7 @@ def _analyse(data: TestData) -> Result:
     if not measured:
         return Result()
     notes: list[str] = []
-    options = SensitivityOptions.model_validate(measured[0].trial.options, context={"si": True})
+    options = validated(SensitivityOptions, measured[0].trial.options)
     responses = _responses(measured)
     figures = tuple(model_figures(measured, options.compensation))
     if not responses:
