@@ -30,7 +30,7 @@ from campaign.experiments.interface import (
     metrics,
 )
 from campaign.experiments.responses.figures import coherence_figure, response_figures
-from campaign.experiments.responses.signals import usable
+from campaign.experiments.responses.signals import STEADY, usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
 from campaign.experiments.shared.common import conditions, joined, of_each_place
@@ -38,15 +38,12 @@ from campaign.experiments.shared.default_options import NO_ROOM, torque_above_fr
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.rounded_choices import Choices, share
 from campaign.physics.bench import Bench
-from campaign.result import Finding, Result, Value
+from campaign.result import Finding, Result
 from campaign.trial import Task, TrialRequest
 
 OWN = ("realisation",)
 """Conditions in which the trials of one group differ."""
-STEADY = "steady"
-"""The measured window."""
 READING = Reading("auto", "H1", None, None)
-Place = Mapping[str, Value]
 SWING = 0.7
 """Share of the angle limit that the default options of a rate command may use."""
 FAVARD = 0.5 * math.pi
