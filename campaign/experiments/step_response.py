@@ -44,7 +44,7 @@ from campaign.result import (
     Value,
 )
 from campaign.signals import Polyline
-from campaign.trial import OfferedRecording, Task, Tree, Trial, TrialRequest
+from campaign.trial import OfferedRecording, Task, Trial, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
 LEAST_REST = 0.01
@@ -89,6 +89,7 @@ def _trials(options: StepResponseOptions, bench: Bench) -> Iterator[TrialRequest
     if options.ramp > 0.1 * options.duration:
         raise ValueError("a ramp of over a tenth of the duration is no step; shorten ramp")
     stop = options.rest + options.duration
+    plain = bench.model_copy(update={"friction": {}}).model_dump(mode="json")
     yield TrialRequest(
         Task(
             mode="rate",
@@ -102,7 +103,7 @@ def _trials(options: StepResponseOptions, bench: Bench) -> Iterator[TrialRequest
             sample_rate=options.sample_rate,
             start_angle=options.position,
         ),
-        bench=_without_friction(bench) if options.linear else None,
+        bench=plain if options.linear else None,
         note="without the bench's friction" if options.linear else "",
         windows=tuple(_windows(options)),
     )
@@ -180,11 +181,6 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 ONE_STEP = Cause("of one step", "it is of one step: repeats measure its scatter")
 NOT_SEEN = Cause("not seen in every step", "not every step was seen to do that")
-
-
-def _without_friction(bench: Bench) -> Tree:
-    tree: Tree = bench.model_copy(update={"friction": {}}).model_dump(mode="json")
-    return tree
 
 
 def _evaluate(data: TrialData, paths: list[str]) -> Step:

@@ -34,6 +34,7 @@ from campaign.experiments.any_motion.instrument_estimates import (
     judged_delay,
 )
 from campaign.experiments.any_motion.motions import PLACE_AND_RATE, MotionPiece, never_moved
+from campaign.experiments.interface import no_progress
 from campaign.reason import Cause
 
 SQUARED = "_squared"
@@ -122,7 +123,7 @@ def find(
     delay: float | None = None,
     terms: Sequence[Term] | None = None,
     linear: bool = False,
-    say: Callable[[str], None] = lambda text: None,
+    say: Callable[[str], None] = no_progress,
 ) -> InverseDynamics:
     """Identify from `pieces`; then predict `unseen`.
 

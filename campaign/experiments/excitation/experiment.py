@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
@@ -53,11 +52,10 @@ FAVARD = 0.5 * math.pi
 def _trials(options: ExcitationOptions, bench: Bench) -> Iterator[TrialRequest]:
     moved = (RELATIVE_ANGLE,) if options.signal == "fourier" else (GYRO_RATE,)
     can_use = (GYRO_RATE,) if options.signal == "fourier" else (RELATIVE_ANGLE,)
-    mode: Literal["rate", "torque"] = options.command
     for course in courses(options, bench):
         yield TrialRequest(
             Task(
-                mode=mode,
+                mode=options.command,
                 command=course.command,
                 compensation=options.compensation,
                 duration=course.duration,

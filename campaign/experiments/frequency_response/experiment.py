@@ -152,8 +152,10 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
     closed = options.loop == "closed"
     if closed:
         command, swing = rate_sine(bench, frequency, options.amplitude, options.max_acceleration)
+        size = rate_text(command.amplitude)
     else:
         command, swing = torque_sine(bench, frequency, options.torque, options.position)
+        size = torque_text(command.amplitude)
     return TrialRequest(
         Task(
             mode="rate" if closed else "torque",
@@ -165,7 +167,7 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
             start_angle=options.position - swing,
         ),
         point={"frequency": frequency},
-        note=f"{options.cycles} cycles after {settle} to settle; {amplitude_text(command, closed)}",
+        note=f"{options.cycles} cycles after {settle} to settle; amplitude {size}",
         requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
         windows=(Window(STEADY, start, stop),),
     )
@@ -333,13 +335,6 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
 
 LIMIT_SHARE = 0.9
 """Share of the bench's limits that a rate command's amplitude may use."""
-
-
-def amplitude_text(command: Sine, closed: bool) -> str:
-    """Amplitude of a rate command in a closed loop, or of a torque in an open one, in words."""
-    if closed:
-        return f"amplitude {rate_text(command.amplitude)}"
-    return f"amplitude {torque_text(command.amplitude)}"
 
 
 def rate_sine(

@@ -44,6 +44,11 @@ class MapSet:
         return self.found[direction][parameter].value
 
 
+def by_map(sets: Sequence[MapSet], parameter: str) -> Array:
+    """Values of a parameter, shape (maps, directions)."""
+    return np.array([[each.value(name, parameter) for name in DIRECTIONS] for each in sets])
+
+
 def overlay_figure(sets: Sequence[MapSet], trials: tuple[int, ...]) -> Figure:
     """Figure 4.9: maps on one another, and their differences from the first."""
     shown = list(sets[:SHOWN])
@@ -164,7 +169,7 @@ def _apart(sets: Sequence[MapSet], means: Mapping[str, Estimate]) -> str:
     level = 1.0 - (1.0 - LEVEL) / len(means)
     apart = []
     for name in means:
-        each = np.array([[one.value(d, name) for d in DIRECTIONS] for one in sets])
+        each = by_map(sets, name)
         if _differs(each[:, 1] - each[:, 0], level, ROUNDING * float(np.max(np.abs(each)))):
             apart.append(SYMBOLS[name])
     if not apart:
