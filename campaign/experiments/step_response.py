@@ -134,9 +134,8 @@ def _found(
 
 def _answer(trial: Trial) -> Window:
     """Window of the response: the one named `answer`, else that of the options."""
-    options = _options(trial)
-    named = [window for window in trial.windows if window.name == ANSWER]
-    return (named or [each for each in _windows(options) if each.name == ANSWER])[0]
+    windows = (*trial.windows, *_windows(_options(trial)))
+    return next(window for window in windows if window.name == ANSWER)
 
 
 def _options(trial: Trial) -> StepResponseOptions:

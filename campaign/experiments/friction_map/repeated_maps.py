@@ -101,7 +101,8 @@ def _drifts(sets: Sequence[MapSet]) -> str:
         for direction in DIRECTIONS:
             _, change = _change(sets[0], each, direction)
             if len(change):
-                ends = [amount(float(end), "N m", digits=2) for end in _ends(change)]
+                extremes = (np.min(change), np.max(change))
+                ends = [amount(float(end), "N m", digits=2) for end in extremes]
                 mean = amount(float(np.mean(change)), "N m", digits=2)
                 words.append(f"{mean} ({ends[0]} to {ends[1]}) {direction}")
         if words:
@@ -110,10 +111,6 @@ def _drifts(sets: Sequence[MapSet]) -> str:
         return ""
     of_first = f"Difference from sets {sets[0].name}, mean and range over the speeds"
     return f" {of_first}: {'; '.join(parts)}."
-
-
-def _ends(values: Array) -> tuple[float, float]:
-    return float(np.min(values)), float(np.max(values))
 
 
 def scatter_figure(

@@ -258,16 +258,13 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
 
 def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
     """Advice for maps whose runs settle for too short an angle, one note per bench."""
-    runs: dict[str, list[tuple[float, float]]] = {}
-    rigs: dict[str, Rig] = {}
+    by_bench: dict[str, list[Trial]] = {}
     for trial in trials:
-        if trial.task.mode == "recorded":  # its settling was not planned
-            continue
-        key = canonical_json(trial.bench)
-        rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
-        runs.setdefault(key, []).append((speed_of(trial), settled_angle(trial)))
-    for key, own in runs.items():
-        where, advice = settling_of_runs(rigs[key], own)
+        if trial.task.mode != "recorded":  # else its settling was not planned
+            by_bench.setdefault(canonical_json(trial.bench), []).append(trial)
+    for own in by_bench.values():
+        runs = [(speed_of(trial), settled_angle(trial)) for trial in own]
+        where, advice = settling_of_runs(Rig(bench_of(own[0])), runs)
         if advice:
             yield f"At {where}: {advice}."
 

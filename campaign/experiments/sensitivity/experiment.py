@@ -23,7 +23,6 @@ from campaign.experiments.sensitivity.model_variation import model_figures, mode
 from campaign.experiments.sensitivity.results import (
     SYMBOLS,
     Response,
-    ResponseVerdict,
     judge,
     sensitivity_figure,
     sensitivity_findings,
@@ -42,7 +41,7 @@ from campaign.experiments.shared.pointing_error import (
     windows_of,
 )
 from campaign.physics.bench import Bench
-from campaign.result import Figure, Finding, Result, Value
+from campaign.result import Finding, Result, Value
 from campaign.trial import TrialRequest
 from campaign.units import Angle, in_words
 
@@ -187,21 +186,17 @@ def _analyse(data: TestData) -> Result:
         notes.append("Thresholds and ranks are not compared: they need every trial.")
     findings.append(Finding.of(unchanged, conditions))
     notes += _skipped_notes(measured, options)
+    name = options.compensation
     return Result(
         (sensitivity_table(judged, limit, seen_through(measured[0].trial)),),
-        (*_figures(judged, limit, conditions, whole), *figures),
+        (
+            *thresholds_figure(judged, limit, name, conditions if whole else None),
+            sensitivity_figure(judged, limit, name),
+            *figures,
+        ),
         tuple(findings),
         tuple(notes),
     )
-
-
-def _figures(
-    judged: Sequence[ResponseVerdict], limit: Threshold, told: Mapping[str, Value], whole: bool
-) -> Iterator[Figure]:
-    """Figures of thresholds, compared with published ones if `whole`, and of all errors."""
-    compensation = str(told["compensation"])
-    yield from thresholds_figure(judged, limit, compensation, told if whole else None)
-    yield sensitivity_figure(judged, limit, compensation)
 
 
 def _skipped_notes(measured: Sequence[TrialData], options: SensitivityOptions) -> Iterator[str]:
