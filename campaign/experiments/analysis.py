@@ -10,7 +10,7 @@ from campaign.axis_kind import BOTH_ROTARY, axis_terms, sides_in
 from campaign.channels import missing
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.interface import ChangedTrial, Experiment, TestData, TrialData
 from campaign.experiments.post_processing.axis_units import in_axis_units
 from campaign.experiments.post_processing.draws import draws_of, merged
 from campaign.experiments.post_processing.key_numbers import key_numbers
@@ -116,7 +116,7 @@ def _measured_trials(
             continue
         try:
             estimates = tuple(map(in_axis_units, experiment.measure(item)))
-            with_metrics[id(item)] = _Instead(item, item.trial.point, estimates)
+            with_metrics[id(item)] = ChangedTrial(item, estimates)
         except (ArchiveError, UsageError):
             raise
         except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, of one trial
@@ -178,7 +178,7 @@ def _own(experiment: Experiment, data: TrialData) -> TrialData:
     """The trial without the metrics of another experiment."""
     if data.trial.kind == experiment.name or not data.estimates:
         return data
-    return _Instead(data, data.trial.point, ())
+    return ChangedTrial(data, ())
 
 
 def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
@@ -241,21 +241,5 @@ def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
 
 def _with_points(data: TestData, moved: Iterable[tuple[TrialData, Mapping[str, Any]]]) -> TestData:
     """Test data of these trials, each at its new point of the sweep."""
-    return replace(data, trials=tuple(_Instead(*each) for each in moved))
-
-
-class _Instead:
-    """A trial with another point of the sweep, or with other metrics; the rest is unchanged."""
-
-    def __init__(
-        self,
-        data: TrialData,
-        point: Mapping[str, Any],
-        estimates: Sequence[Estimate] | None = None,
-    ) -> None:
-        self.trial = data.trial.model_copy(update={"point": dict(point)})
-        self.ending = data.ending
-        self.recording = data.recording
-        self.channel_names = data.channel_names
-        self.not_kept = data.not_kept
-        self.estimates = data.estimates if estimates is None else estimates
+    trials = tuple(ChangedTrial(item, item.estimates, point=dict(at)) for item, at in moved)
+    return replace(data, trials=trials)

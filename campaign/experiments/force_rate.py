@@ -19,7 +19,7 @@ from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.estimation.sampled_curve import at_sample, bracketed, peak
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.interface import Experiment, TestData, TrialData, validated
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
@@ -94,7 +94,7 @@ def _trials(options: ForceRateOptions, bench: Bench) -> Iterator[TrialRequest]:
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
     """Largest friction before sliding (N m), and the torque applied at that moment (N m)."""
-    options = ForceRateOptions.model_validate(data.trial.options, context={"si": True})
+    options = validated(ForceRateOptions, data.trial.options)
     recording = data.recording()
     sliding = np.abs(recording[LOAD_RATE]) > options.sliding_rate
     if not sliding.any():

@@ -19,8 +19,9 @@ from campaign.estimate import Estimate, Window
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, drop_interval_if_deterministic
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, validated
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
+from campaign.experiments.shared.common import closed
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
     ConditionGroup,
@@ -146,7 +147,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
 
     Not determined where samples of a cycle were lost (NaN).
     """
-    options = FrictionLagOptions.model_validate(data.trial.options, context={"si": True})
+    options = validated(FrictionLagOptions, data.trial.options)
     frequency = float(str(data.trial.point["frequency"]))
     common = options.mean_rate + options.amplitude * np.linspace(-0.98, 0.98, 99)
     recording = data.recording()
@@ -190,19 +191,15 @@ def loop_shape(rate: Array, friction: Array, common: Array) -> tuple[float, floa
     falling = np.interp(common, rate[top:][::-1], friction[top:][::-1])
     difference = rising - falling
     widest = float(difference[np.argmax(np.abs(difference))])
-    closed_rate, closed_friction = _closed(rate, friction)
+    closed_rate, closed_friction = closed(rate, friction)
     area = float(np.trapezoid(closed_friction, closed_rate))
     return float(difference[len(common) // 2]), widest, area
-
-
-def _closed(rate: Array, friction: Array) -> tuple[Array, Array]:
-    return np.append(rate, rate[0]), np.append(friction, friction[0])
 
 
 def _loop(frequency: float, trials: Sequence[TrialData]) -> Loop:
     estimates = combined(trials, _measure)
     cut = trials[0].recording().window(*trials[0].trial.task.window)
-    rate, friction = _closed(cut[LOAD_RATE], cut[FRICTION_TORQUE])
+    rate, friction = closed(cut[LOAD_RATE], cut[FRICTION_TORQUE])
     largest = float(np.nanmax(np.abs(friction), initial=0.0))
     swing = 0.5 * float(np.ptp(trials[0].trial.task.command.sample(cut.time)))
     scales = largest, largest, largest * swing

@@ -49,6 +49,18 @@ class TrialData(Protocol):
         """Why its recorded samples were not archived; empty if they were."""
 
 
+class ChangedTrial:
+    """A finished trial with other metrics, and other attributes of its `trial`."""
+
+    def __init__(self, data: TrialData, estimates: Sequence[Estimate], **changes: Any) -> None:
+        self.trial = data.trial.model_copy(update=changes)
+        self.ending = data.ending
+        self.recording = data.recording
+        self.channel_names = data.channel_names
+        self.not_kept = data.not_kept
+        self.estimates = estimates
+
+
 def no_progress(text: str) -> None:
     """Ignore progress."""
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from campaign.channels import RELATIVE_ANGLE
 from campaign.estimation.intervals import of_series, shifted_by
 from campaign.estimation.sampled_curve import shifted
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, validated
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Cell, Column, Result, Table
@@ -106,7 +106,7 @@ def _analyse(data: TestData) -> Result:
 
 
 def _row(data: TrialData) -> dict[str, Cell]:
-    options = MoveOptions.model_validate(data.trial.options, context={"si": True})
+    options = validated(MoveOptions, data.trial.options)
     target = options.position if options.cycles else options.angle
     recording = data.recording()
     row: dict[str, Cell] = {"trial": data.trial.name, "role": data.trial.role.value}

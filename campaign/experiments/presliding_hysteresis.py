@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -17,9 +17,10 @@ from pydantic import Field
 from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import shifted_by
-from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics, validated
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
+from campaign.experiments.shared.common import closed
 from campaign.experiments.shared.friction_models import ConditionGroup, in_models, places
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -117,45 +118,40 @@ NOISELESS = Cause(
 UNITS = {"peak": "N m", "hysteresis_energy": "J", "loss_factor": ""}
 
 
-@dataclass(frozen=True)
-class Loop:
-    """One closed cycle: displacement (rad) and friction (N m), shape (n,)."""
+def loop_sizes(displacement: Array, friction: Array, amplitude: float) -> dict[str, float]:
+    """Largest torque (N m), energy (J), and loss factor of a closed cycle.
 
-    displacement: Array
-    friction: Array
-
-    def sizes(self, amplitude: float) -> dict[str, float]:
-        """Largest torque (N m), energy (J), and loss factor: energy over pi times peak times
-        amplitude (rad), 0 for a spring, 4/pi for dry sliding.
-        """
-        peak = float(np.max(np.abs(self.friction)))
-        energy = float(np.trapezoid(self.friction, self.displacement))
-        loss = energy / (np.pi * peak * amplitude) if peak > 0 else 0.0
-        return {"peak": peak, "hysteresis_energy": energy, "loss_factor": loss}
+    The loss factor is energy over pi times peak times amplitude (rad): 0 for a spring, 4/pi for dry
+    sliding. displacement (rad), friction (N m): shape (n,).
+    """
+    peak = float(np.max(np.abs(friction)))
+    energy = float(np.trapezoid(friction, displacement))
+    loss = energy / (np.pi * peak * amplitude) if peak > 0 else 0.0
+    return {"peak": peak, "hysteresis_energy": energy, "loss_factor": loss}
 
 
 def _amplitude_of(data: TrialData) -> float:
     return float(str(data.trial.point["amplitude"]))
 
 
-def _loop(data: TrialData, window: Window) -> Loop:
+def _loop(data: TrialData, window: Window) -> tuple[Array, Array]:
+    """Displacement (rad) and friction (N m) of a closed cycle, each (n,)."""
     cut = data.recording().window(window.start, window.stop)
     if not len(cut.time):
         raise ValueError("the recording ends before its last loop")
-    return Loop(
-        np.append(cut[RELATIVE_ANGLE], cut[RELATIVE_ANGLE][0]),
-        np.append(cut[FRICTION_TORQUE], cut[FRICTION_TORQUE][0]),
-    )
+    return closed(cut[RELATIVE_ANGLE], cut[FRICTION_TORQUE])
 
 
 def _windows(data: TrialData) -> tuple[Window, ...]:
-    options = PreslidingHysteresisOptions.model_validate(data.trial.options, context={"si": True})
+    options = validated(PreslidingHysteresisOptions, data.trial.options)
     return data.trial.windows or windows_of(options)
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Sizes of the last loop; their difference from the loop before is a systematic part."""
-    before, last = (_loop(data, window).sizes(_amplitude_of(data)) for window in _windows(data))
+    before, last = (
+        loop_sizes(*_loop(data, window), _amplitude_of(data)) for window in _windows(data)
+    )
     return [
         shifted_by(
             Estimate.without_interval(name, last[name], unit, NOISELESS()),
@@ -252,9 +248,8 @@ def _panels(place: ConditionGroup, display: str) -> Iterator[Panel]:
 
 def _panel(place: ConditionGroup, display: str) -> Panel:
     curves = [
-        Curve(loop.displacement, loop.friction, label, label, "loop")
+        Curve(*_loop(item, _windows(item)[-1]), label, label, "loop")
         for item in place.trials
-        for loop in [_loop(item, _windows(item)[-1])]
         for label in [_amplitude(_amplitude_of(item), display)]
     ]
     return Panel(

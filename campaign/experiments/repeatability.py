@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.intervals import of_repeats
 from campaign.estimation.scatter import relative_scatter
@@ -23,6 +21,7 @@ from campaign.experiments.friction_map.curves import fit_map
 from campaign.experiments.friction_map.points import measure, points_of, steady
 from campaign.experiments.friction_map.repeated_maps import (
     MapSet,
+    by_map,
     overlay_figure,
     scatter_figure,
 )
@@ -41,7 +40,6 @@ from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.systematic import shared_parts
 from campaign.reason import Cause
 from campaign.result import (
-    Array,
     Cell,
     Column,
     Finding,
@@ -98,11 +96,6 @@ def _analyse(data: TestData) -> Result:
     return Result((_table(sets),), tuple(figures), findings, tuple(notes))
 
 
-def _by_map(sets: Sequence[MapSet], parameter: str) -> Array:
-    """Values of a parameter, shape (maps, directions)."""
-    return np.array([[each.value(name, parameter) for name in DIRECTIONS] for each in sets])
-
-
 def _mean(sets: Sequence[MapSet], parameter: str) -> Estimate:
     """Mean of a parameter over all maps and directions; each map is one repetition.
 
@@ -110,14 +103,14 @@ def _mean(sets: Sequence[MapSet], parameter: str) -> Estimate:
     bench's constants shift all maps equally.
     """
     parts = shared_parts(_found(sets, parameter))
-    values, unit = _by_map(sets, parameter).mean(axis=1), UNITS[parameter]
+    values, unit = by_map(sets, parameter).mean(axis=1), UNITS[parameter]
     mean = of_repeats(parameter, values, unit, "maps", systematic=parts)
     return _flagged(mean, _found(sets, parameter))
 
 
 def _deviation(sets: Sequence[MapSet], parameter: str) -> Estimate:
     """Relative standard deviation over all maps and directions, as in Table 4.4."""
-    deviation = relative_scatter(parameter, _by_map(sets, parameter))
+    deviation = relative_scatter(parameter, by_map(sets, parameter))
     return _flagged(deviation, _found(sets, parameter))
 
 

@@ -19,8 +19,9 @@ from campaign.estimation.step_response import (
     StepCharacteristics,
     step_characteristics,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, key, metrics
+from campaign.experiments.interface import Experiment, TestData, TrialData, key, metrics, validated
 from campaign.experiments.shared import default_options
+from campaign.experiments.shared.captions import duration
 from campaign.experiments.shared.common import conditions, grouped, method_label, swept
 from campaign.experiments.shared.detected_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
@@ -43,7 +44,7 @@ from campaign.result import (
     Value,
 )
 from campaign.signals import Polyline
-from campaign.trial import OfferedRecording, Task, Tree, Trial, TrialRequest
+from campaign.trial import OfferedRecording, Task, Trial, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
 LEAST_REST = 0.01
@@ -88,6 +89,7 @@ def _trials(options: StepResponseOptions, bench: Bench) -> Iterator[TrialRequest
     if options.ramp > 0.1 * options.duration:
         raise ValueError("a ramp of over a tenth of the duration is no step; shorten ramp")
     stop = options.rest + options.duration
+    plain = bench.model_copy(update={"friction": {}}).model_dump(mode="json")
     yield TrialRequest(
         Task(
             mode="rate",
@@ -101,7 +103,7 @@ def _trials(options: StepResponseOptions, bench: Bench) -> Iterator[TrialRequest
             sample_rate=options.sample_rate,
             start_angle=options.position,
         ),
-        bench=_without_friction(bench) if options.linear else None,
+        bench=plain if options.linear else None,
         note="without the bench's friction" if options.linear else "",
         windows=tuple(_windows(options)),
     )
@@ -132,15 +134,14 @@ def _found(
 
 def _answer(trial: Trial) -> Window:
     """Window of the response: the one named `answer`, else that of the options."""
-    options = _options(trial)
-    named = [window for window in trial.windows if window.name == ANSWER]
-    return (named or [each for each in _windows(options) if each.name == ANSWER])[0]
+    windows = (*trial.windows, *_windows(_options(trial)))
+    return next(window for window in windows if window.name == ANSWER)
 
 
 def _options(trial: Trial) -> StepResponseOptions:
     """Options of a trial. Raises ValueError with a message for the user if of another test."""
     try:
-        return StepResponseOptions.model_validate(trial.options, context={"si": True})
+        return validated(StepResponseOptions, trial.options)
     except ValidationError as error:
         wrong = ", ".join(str(each["loc"][0]) for each in error.errors() if each["loc"])
         raise ValueError(f"these options fit no step response: {wrong}") from None
@@ -179,11 +180,6 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 ONE_STEP = Cause("of one step", "it is of one step: repeats measure its scatter")
 NOT_SEEN = Cause("not seen in every step", "not every step was seen to do that")
-
-
-def _without_friction(bench: Bench) -> Tree:
-    tree: Tree = bench.model_copy(update={"friction": {}}).model_dump(mode="json")
-    return tree
 
 
 def _evaluate(data: TrialData, paths: list[str]) -> Step:
@@ -373,7 +369,7 @@ def _marks(step: Step) -> Iterator[Mark]:
     rise, settled, over = (step.value(name) for name in ("rise_time", "settling_time", "overshoot"))
     if math.isfinite(rise + step.rise_from):
         start = step.rise_from
-        yield Mark(f"rise {_time(rise)}", x=start, until=start + rise, series=step.series)
+        yield Mark(f"rise {duration(rise)}", x=start, until=start + rise, series=step.series)
     if over > 0:
         # Only after the step: noise before it may be as large.
         share = np.where(step.time >= 0, step.rate / step.options.step, np.nan)
@@ -382,11 +378,7 @@ def _marks(step: Step) -> Iterator[Mark]:
         x, y = float(step.time[peak]), float(step.rate[peak])
         yield Mark(label, x=x, y=y, point=True, series=step.series)
     if math.isfinite(settled):
-        yield Mark(f"settled {_time(settled)}", x=settled, series=step.series)
-
-
-def _time(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+        yield Mark(f"settled {duration(settled)}", x=settled, series=step.series)
 
 
 EXPERIMENT = Experiment(

@@ -18,7 +18,7 @@ from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, bracketed, peak, upward_crossings
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.interface import Experiment, TestData, TrialData, validated
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.experiments.shared.common import COUNTED
 from campaign.experiments.shared.friction_models import (
@@ -104,7 +104,7 @@ share of 0.013 in 0.2 of a period."""
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
     """Numbers of slips and rests, and the metrics of `UNITS` that the pull shows."""
-    options = StickSlipOptions.model_validate(data.trial.options, context={"si": True})
+    options = validated(StickSlipOptions, data.trial.options)
     recording = data.recording()
     rate = recording[LOAD_RATE]
     peaks = peak("peak_torque", recording[DRIVE_TORQUE], "N m"), peak("top_rate", rate, "rad/s")
@@ -271,7 +271,7 @@ def _first_slip(recording: Recording, found: Mapping[str, Estimate], series: str
 
 def _how(item: TrialData) -> str:
     """Caption sentence: rate of the pull and stiffness of the spring."""
-    options = StickSlipOptions.model_validate(item.trial.options, context={"si": True})
+    options = validated(StickSlipOptions, item.trial.options)
     pull, spring = setting(options.pull_rate, "rad/s"), setting(options.stiffness, "N m/rad")
     return f"The load is pulled at {pull} through a spring of {spring}."
 

@@ -1,8 +1,8 @@
 """Stribeck curve: friction of steady sliding at many constant speeds.
 
 The load is moved at each speed exactly as prescribed, without a drive, in both directions. Once the
-bristles have settled, the friction torque lies on the curve that the model promises for steady
-sliding (Figure 2.9, Equation 4.6); what the measurement adds is that it does get there.
+bristles have settled, the friction torque lies on the model's curve of steady sliding (Figure 2.9,
+Equation 4.6). The measurement shows that it reaches this curve.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ TORQUE = "friction_torque"
 RAMP = 0.1
 """s, from rest to the speed."""
 LEVEL = 1e-3
-"""of a torque, by which it must change to be told as falling or rising."""
+"""Smallest relative change of a torque that counts as a fall or a rise."""
 SHOWN = 1.5
-"""Share of the fastest speed that has no point but is drawn, either way."""
+"""Factor by which curves extend beyond the slowest and the fastest speed."""
 
 
 def default_speeds() -> tuple[float, ...]:
@@ -127,7 +127,7 @@ class _Points:
 
     Attributes:
         promised: friction of steady sliding by the bench's own model (N m), shape (n,).
-        deviations: share by which each reading is off that, whatever the sign.
+        deviations: relative deviation of each reading from it, as a magnitude.
     """
 
     rates: tuple[Estimate, ...]
@@ -142,7 +142,7 @@ class _Points:
 
 
 def _points(place: ConditionGroup) -> _Points:
-    """Those that moved and told a torque: without a rate the model promises no friction."""
+    """Readings with a rate and a torque: without a rate the model states no friction."""
     read = (combined(trials, _measure) for trials in place.by("speed").values())
     moved = [each for each in read if each["rate"].value]
     found = [each for each in moved if math.isfinite(each["rate"].value + each[TORQUE].value)]
@@ -218,15 +218,8 @@ def _analyse(data: TestData) -> Result:
     return Result((table,), (figure,), tuple(findings))
 
 
-def _least(fine: Array, torque: Array) -> int | None:
-    """Where friction is least between two higher ends, beyond rounding; None for no such place."""
-    at = int(np.argmin(torque))
-    low = torque[at] * (1.0 + LEVEL)
-    return at if torque[0] > low and torque[-1] > low else None
-
-
 def _what_shows(place: ConditionGroup, points: _Points) -> str:
-    """How friction goes from the slowest to the fastest speed, as the points have it."""
+    """Caption sentence: friction of the points from the slowest to the fastest speed."""
     speed = np.abs(points.rate)
     torques = [
         multiplied(torque, float(np.sign(rate)))
@@ -248,13 +241,13 @@ def _what_shows(place: ConditionGroup, points: _Points) -> str:
 
 
 def _higher(one: Estimate, other: Estimate) -> bool:
-    """Whether one torque is above another, their intervals apart."""
+    """Whether one torque exceeds another by more than their intervals."""
     high = other.combined[1] if other.has_interval else None
     return surely_above(one, other.value if high is None else high, LEVEL * abs(other.value))
 
 
 def _panels(place: ConditionGroup, points: _Points) -> Iterator[Panel]:
-    """A panel for each direction that was measured: in one, both would lie on one another."""
+    """A panel for each measured direction: in one panel they would overlap."""
     bench = bench_of(place.trials[0].trial)
     speed = np.abs(points.rate)
     fine = np.geomspace(speed.min() / SHOWN, speed.max() * SHOWN, 400)
@@ -279,16 +272,16 @@ def _panels(place: ConditionGroup, points: _Points) -> Iterator[Panel]:
 
 
 def _least_mark(fine: Array, torque: Array) -> Iterator[Mark]:
-    """Where friction (N m) is least over the speeds `fine` (rad/s), both (n,)."""
-    least = _least(fine, torque)
-    if least is not None:
+    """Mark of the least friction (N m) over speeds (rad/s), both (n,), if it rises to both ends."""
+    least = int(np.argmin(torque))
+    if min(torque[0], torque[-1]) > torque[least] * (1.0 + LEVEL):
         at, lowest = float(fine[least]), float(torque[least])
         label = f"least: {amount(lowest, 'N m')} at {amount(at, 'rad/s', 'deg/s', 2)}"
         yield Mark(label, x=at, y=lowest, point=True, series="fit")
 
 
 def _direction(points: _Points, sign: float, name: str) -> Curve:
-    """The readings of one direction over their speeds, with their intervals."""
+    """Readings of one direction over their speeds, with intervals."""
     chosen = [
         multiplied(torque, sign)
         for rate, torque in zip(points.rate, points.torques, strict=True)

@@ -162,15 +162,11 @@ def shown_models(found: InverseDynamics) -> list[tuple[str, CandidateFit]]:
     names = []
     for index in dict.fromkeys(picked):
         each = found.tried[index]
-        name = "Directions alike" if _is_symmetric(each) else "By direction"
+        name = "Directions alike" if "coulomb" in each.structure.names else "By direction"
         name += ", delayed" if each.delay else ""
         chosen = index == found.chosen and index > 1
         names.append(("Chosen" if chosen else name, each))
     return names[:BEST]
-
-
-def _is_symmetric(each: CandidateFit) -> bool:
-    return "coulomb" in each.structure.names
 
 
 def autocorrelation(residuals: Sequence[Array]) -> tuple[Array, Array, float]:

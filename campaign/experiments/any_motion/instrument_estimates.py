@@ -62,10 +62,6 @@ class Instruments:
     estimates: dict[str, Estimate]
     delay: Estimate | None
 
-    def strength(self, index: int) -> float:
-        """F of the first stage of a term, by its index."""
-        return float(self.found.strength[index])
-
 
 def instruments(
     pieces: Sequence[MotionPiece],
@@ -82,34 +78,22 @@ def instruments(
         values: of the terms, by least squares.
         delay: of the force (s); fitted again with the commanded motion, unless it is `stated`.
     """
-    wanted = [each.wanted for each in pieces]
+    fit = partial(_iterated, pieces, terms, values, filtering, delay, stated=stated)
+    wanted = [(each.motion, each.wanted) for each in pieces if each.wanted is not None]
     try:
-        if any(each is None for each in wanted):
+        if len(wanted) < len(pieces):
             raise ValueError("the commanded motion was not recorded")
-        loops = [
-            find_loop(each.motion, each.wanted, filtering.low_pass)
-            for each in pieces
-            if each.wanted is not None
-        ]
-        for fitted in (False,) if stated else (True, False):
-            fit = _iterated(
-                pieces, terms, values, filtering, delay, loops, fitted=fitted, stated=stated
-            )
-            if not fitted or _strong(fit, len(terms) + 1):
-                break
-        if weak := _weak(fit, terms):
-            raise ValueError(weak)
+        loops = [find_loop(*each, filtering.low_pass) for each in wanted]
+        found = fit(loops, fitted=not stated)
+        if not stated and not np.all(found.found.strength >= WEAK):  # that of the delay is the last
+            found = fit(loops, fitted=False)
+        return _checked(found, terms), ""
     except ValueError as error:
         why = str(error)
-    else:
-        return fit, ""
     try:
-        fit = _iterated(pieces, terms, values, filtering, delay, None, fitted=False, stated=stated)
+        return _checked(fit(None, fitted=False), terms), why
     except ValueError as error:
         return None, f"{why}; along the recorded force: {error}"
-    if weak := _weak(fit, terms):
-        return None, f"{why}; along the recorded force: {weak}"
-    return fit, why
 
 
 def held_against(
@@ -167,16 +151,15 @@ def _shifted(one: Estimate, other: Estimate) -> Estimate:
     return shifted_by(one, "instruments", abs(one.value - other.value))
 
 
-def _strong(found: Instruments, count: int) -> bool:
-    return bool(np.all(found.found.strength[:count] >= WEAK))
-
-
-def _weak(found: Instruments, terms: Sequence[Term]) -> str:
+def _checked(found: Instruments, terms: Sequence[Term]) -> Instruments:
+    """The instruments. Raises ValueError if they are weak for a term."""
     strength = found.found.strength[: len(terms)]
     index = int(np.argmin(strength))
-    if strength[index] >= WEAK:
-        return ""
-    return f"the simulated motion hardly determines {terms[index].name} (F {strength[index]:.2g})"
+    if not strength[index] >= WEAK:
+        raise ValueError(
+            f"the simulated motion hardly determines {terms[index].name} (F {strength[index]:.2g})"
+        )
+    return found
 
 
 def _iterated(

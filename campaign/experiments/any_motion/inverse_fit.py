@@ -33,7 +33,8 @@ from campaign.experiments.any_motion.instrument_estimates import (
     instruments,
     judged_delay,
 )
-from campaign.experiments.any_motion.motions import MotionPiece, never_moved
+from campaign.experiments.any_motion.motions import PLACE_AND_RATE, MotionPiece, never_moved
+from campaign.experiments.interface import no_progress
 from campaign.reason import Cause
 
 SQUARED = "_squared"
@@ -122,7 +123,7 @@ def find(
     delay: float | None = None,
     terms: Sequence[Term] | None = None,
     linear: bool = False,
-    say: Callable[[str], None] = lambda text: None,
+    say: Callable[[str], None] = no_progress,
 ) -> InverseDynamics:
     """Identify from `pieces`; then predict `unseen`.
 
@@ -247,8 +248,7 @@ def _period(
     motions: Sequence[Motion], start: Sequence[Term], filtering: FilterSettings, delay: float
 ) -> float | None:
     fit = structure(motions, start, filtering, delay).fit
-    own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
-    place = [rows(motion, own, filtering).columns for motion in motions]
+    place = [rows(motion, PLACE_AND_RATE, filtering).columns for motion in motions]
     whole = np.concatenate(place)
     interval = filtering.decimation / motions[0].sample_rate
     return find_period(whole[:, 0], whole[:, 1], np.concatenate(fit.residuals), interval)
@@ -347,9 +347,9 @@ def _without_shares(
     That term approximates any curvature of friction, most often a Stribeck curve. Coulomb and
     viscous friction then compensate its error at other rates.
     """
-    if not any(term.family == "bend" for term in terms):
-        return dict(estimates)
     shares = {term.name for term in terms if term.family == "bend"}
+    if not shares:
+        return dict(estimates)
     return {
         name: Estimate.without_interval(
             name, one.value, one.unit, BENDS(), method=one.method, origin=Origin.NOT_DETERMINED

@@ -28,6 +28,7 @@ from campaign.experiments.any_motion.tables import (
     structures_table,
 )
 from campaign.experiments.interface import TestData
+from campaign.experiments.shared.common import correlations
 from campaign.experiments.shared.directions import with_offset
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen, is_value
@@ -125,10 +126,9 @@ def identify(data: TestData, options: InverseDynamicsOptions) -> Result:
 
 
 def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
-    fit = found.fit
     together = {
         name: (other, share)
-        for one, two, share in correlated(fit, found.best.structure.terms)
+        for one, two, share in correlated(found)
         for name, other in ((one, two), (two, one))
     }
     scaled = {name: with_constants(one, data) for name, one in found.estimates.items()}
@@ -251,7 +251,7 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
             f"The force is {force}, measured at the load: what motor and gear need themselves, "
             "their inertia and friction, is not in it."
         )
-    for one, two, share in correlated(found.fit, found.best.structure.terms):
+    for one, two, share in correlated(found):
         yield (
             f"{words(one)} and {words(two)} are correlated ({share:.3f}): "
             "the motion hardly separates them; only their sum is well determined."
@@ -267,14 +267,9 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
 
 
 def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
-    held, terms = found.instruments, found.best.structure.terms
+    held = found.instruments
     fit = held.found.fit if found.biased and held is not None else found.fit
-    matrix = fit.correlation
-    return {
-        (terms[i].name, terms[j].name): float(matrix[i, j])
-        for i in range(len(terms))
-        for j in range(i)
-    }
+    return correlations(found.best.structure.names, fit.correlation)
 
 
 def _settings(

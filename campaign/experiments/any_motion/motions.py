@@ -31,6 +31,7 @@ from campaign.estimation.inverse.motion import (
 from campaign.estimation.inverse.rows import all_rows
 from campaign.estimation.inverse.terms import Term
 from campaign.experiments.interface import TestData, TrialData
+from campaign.experiments.shared.recorded_motion import validation_of
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_scale, with_systematic
 from campaign.signals import MultiSine
 from campaign.trial import Recording
@@ -105,12 +106,8 @@ def read(
     decimation = decimation or max(plain.decimation, round(rate / rows_of(data.trials)))
     filtering = FilterSettings(low_pass or plain.low_pass, decimation, round(skip * rate))
     pieces = moved(data.trials, filtering)
-    if not data.validation:
-        return filtering, pieces, ()
-    unseen, why = usable(data.validation)
-    if why:
-        raise ValueError(f"of the validation {why}")
-    return filtering, pieces, moved(unseen, filtering)
+    unseen = validation_of(data, usable)
+    return filtering, pieces, moved(unseen, filtering) if unseen else ()
 
 
 def rows_of(trials: Sequence[TrialData]) -> float:
@@ -147,10 +144,17 @@ def moved(trials: Sequence[TrialData], filtering: FilterSettings) -> tuple[Motio
     return pieces
 
 
+PLACE_AND_RATE = (
+    Term("q", "", "", "", lambda motion: motion.position),
+    Term("v", "", "", "", lambda motion: motion.rate),
+)
+"""Columns of rows: angle and rate."""
+
+
 def place_and_rate(pieces: Sequence[MotionPiece], filtering: FilterSettings) -> Array:
     """Angle and rate of each row, shape (n, 2)."""
-    own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
-    return np.concatenate([all_rows(each.motion, own, filtering).columns for each in pieces])
+    rows = [all_rows(each.motion, PLACE_AND_RATE, filtering).columns for each in pieces]
+    return np.concatenate(rows)
 
 
 def force_of(trial: TrialData) -> str:

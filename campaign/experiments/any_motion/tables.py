@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
-from campaign.estimation.inverse.regression import Regression
-from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.instrument_estimates import Instruments, differs
 from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics
+from campaign.experiments.shared.common import correlations
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 
@@ -124,7 +123,7 @@ def instruments_table(found: InverseDynamics, held: Instruments) -> Table:
             "unit": term.unit,
             "squares": found.squares[term.name],
             "instruments": held.estimates[term.name],
-            "strength": held.strength(index),
+            "strength": float(held.found.strength[index]),
         }
         for index, term in enumerate(found.best.structure.terms)
     ]
@@ -172,13 +171,8 @@ def instruments_note(found: InverseDynamics) -> str:
     )
 
 
-def correlated(fit: Regression, terms: tuple[Term, ...]) -> Iterator[tuple[str, str, float]]:
+def correlated(found: InverseDynamics) -> list[tuple[str, str, float]]:
     """Pairs of coefficients with a correlation of `STRONG` or more, the strongest first."""
-    matrix = fit.correlation
-    pairs = [
-        (terms[i].name, terms[j].name, float(matrix[i, j]))
-        for i in range(len(terms))
-        for j in range(i)
-        if abs(matrix[i, j]) >= STRONG
-    ]
-    yield from sorted(pairs, key=lambda pair: -abs(pair[2]))
+    every = correlations(found.best.structure.names, found.fit.correlation)
+    pairs = [(*names, share) for names, share in every.items() if abs(share) >= STRONG]
+    return sorted(pairs, key=lambda pair: -abs(pair[2]))

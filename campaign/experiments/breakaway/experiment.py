@@ -28,9 +28,9 @@ from campaign.estimation.relative_rate import (
     stop_rate,
 )
 from campaign.experiments.breakaway.figures import position_figure, ramp_figure
-from campaign.experiments.breakaway.means import Ramps, means_of, parameters_of, with_comparisons
+from campaign.experiments.breakaway.means import OF_A_RAMP, Ramps, compared, means_of, parameters_of
 from campaign.experiments.breakaway.remarks import remarks
-from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
+from campaign.experiments.breakaway.tables import chord_of, findings_of, table_of, window_table
 from campaign.experiments.interface import (
     Experiment,
     Model,
@@ -39,10 +39,11 @@ from campaign.experiments.interface import (
     bench_of,
     key,
     metrics,
+    validated,
 )
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.captions import trials_of
-from campaign.experiments.shared.common import conditions, grouped, joined
+from campaign.experiments.shared.common import conditions, grouped, joined, suffixes
 from campaign.experiments.shared.detected_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
@@ -80,8 +81,6 @@ FOR_ORIENTATION = Cause(
     "for orientation", "torque over stiffness of the strongest interface, for orientation"
 )
 BY_CRITERION = Cause("chosen by a criterion", "chosen by the Bayesian information criterion")
-OWN = ("measurement", "position", "direction")
-"""Conditions in which the ramps of one group differ."""
 
 
 def default_positions() -> tuple[float, ...]:
@@ -209,12 +208,9 @@ def windows_of(options: BreakawayOptions) -> tuple[Window, Window]:
     return Window("rest", 0.0, options.rest), Window("ramp", options.rest, stop)
 
 
-def _windows(trial: Trial, options: BreakawayOptions) -> dict[str, Window]:
-    return {window.name: window for window in trial.windows or windows_of(options)}
-
-
-def _options(trial: Trial) -> BreakawayOptions:
-    return BreakawayOptions.model_validate(trial.options, context={"si": True})
+def _windows(trial: Trial) -> dict[str, Window]:
+    planned = windows_of(validated(BreakawayOptions, trial.options))
+    return {window.name: window for window in trial.windows or planned}
 
 
 def direction_of(trial: Trial) -> str:
@@ -237,7 +233,7 @@ def _samples(data: TrialData) -> tuple[Array, Array, Array]:
         if bench_of(data.trial).rate_is_of_encoder or made_of_counts(rate, angle, step):
             rate = np.gradient(angle, step)
     # At rest no torque is commanded: the mean is the zero of the sensor.
-    rest = _windows(data.trial, _options(data.trial))["rest"]
+    rest = _windows(data.trial)["rest"]
     zero = torque[(time >= rest.start) & (time < rest.stop)]
     zero = zero[np.isfinite(zero)]
     return time, sign * rate, sign * (torque - (np.mean(zero) if len(zero) else 0.0))
@@ -255,14 +251,14 @@ def curve_of(data: TrialData, breakaway: float) -> Presliding:
 
     Raises ValueError if the ramp does not show enough of it.
     """
-    options = _options(data.trial)
-    start = _windows(data.trial, options)["ramp"].start
+    options = validated(BreakawayOptions, data.trial.options)
+    start = _windows(data.trial)["ramp"].start
     return fit_presliding(*_samples(data), start, breakaway, options.fit_share)
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Breakaway torque and, if the curve can be fitted, stiffness with quantities from it."""
-    options, bench = _options(data.trial), bench_of(data.trial)
+    options, bench = validated(BreakawayOptions, data.trial.options), bench_of(data.trial)
     inertia = inertia_of(bench, "friction of a load that gathers speed")
     seen = _seen(data, options.sliding_rate)
     try:
@@ -305,13 +301,13 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
     if not _is_of_any_size(curve.stiffness_at_rest):
         yield _by_torque_constant(curve.stiffness_at_rest, bench)
     yield _damping(measured, damping, 0.5 * (damping + viscous) / stiffness)
-    yield Estimate.without_interval("chord", curve.chord, "N m/rad", CHORD())
+    yield chord_of(curve.chord)
     span = curve.interfaces[0].torque / curve.interfaces[0].stiffness
     yield Estimate.without_interval("presliding_span", span, "rad", FOR_ORIENTATION())
     count = float(len(curve.interfaces))
     yield Estimate.without_interval("interfaces", count, "", BY_CRITERION(), kind="count")
     for share, own in curve.by_window.items():
-        yield Estimate(**{**vars(own), "name": f"bristle_stiffness_to_{share:g}"})
+        yield replace(own, name=f"bristle_stiffness_to_{share:g}")
 
 
 def _damping(stiffness: Estimate, value: float, slope: float) -> Estimate:
@@ -352,11 +348,9 @@ def _by_torque_constant(estimate: Estimate, bench: Bench) -> Estimate:
 
 
 def _analyse(data: TestData) -> Result:
-    groups = with_comparisons(
-        [_ramps(group) for group in grouped(data.completed(), own=OWN).values()]
-    )
-    suffixes = [f"-{number}" if len(groups) > 1 else "" for number in range(1, len(groups) + 1)]
-    whole = joined(map(_of_ramps, groups, suffixes))
+    places = [_ramps(group) for group in grouped(data.completed(), own=OF_A_RAMP).values()]
+    groups = [compared(ramps, places) for ramps in places]
+    whole = joined(map(_of_ramps, groups, suffixes(len(groups))))
     if data.model is None:
         return whole
     notes = list(whole.notes)

@@ -12,13 +12,11 @@ from campaign.axis_kind import is_linear
 from campaign.estimate import Estimate
 from campaign.estimation.presliding import Presliding
 from campaign.estimation.presliding_curve import presliding_torque
-from campaign.experiments.breakaway.means import Ramps
+from campaign.experiments.breakaway.means import OF_A_RAMP, Ramps
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, Value
 
 TORQUE = Axis("Drive torque", "N m", "N m")
-OF_A_RAMP = ("measurement", "position", "direction")
-"""Conditions of a single ramp that a mean does not have."""
 NAMED = 12
 """Largest number of labeled positions at the axis."""
 CHANCE = 0.05

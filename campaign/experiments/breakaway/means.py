@@ -31,6 +31,8 @@ QUANTITIES = (*MEASURED, "bristle_damping")
 CAUSES = {"ramp rate": "torque_rate", "dwell": "rest"}
 """Causes that may shift all ramps of a test equally; the option whose sweep shows the shift."""
 BOTH = "both"
+OF_A_RAMP = ("measurement", "position", "direction")
+"""Conditions in which the ramps of one place differ, and which a mean does not have."""
 
 
 @dataclass(frozen=True)
@@ -161,12 +163,8 @@ def _between(one: Estimate, other: Estimate) -> Estimate:
     return _as_assumed(average, one) if one.origin is Origin.ASSUMED else admitted(average)
 
 
-def with_comparisons(groups: Sequence[Ramps]) -> list[Ramps]:
-    """Groups with systematic parts of ramp rate and dwell, from comparison of the groups."""
-    return [_compared(ramps, groups) for ramps in groups]
-
-
-def _compared(ramps: Ramps, groups: Sequence[Ramps]) -> Ramps:
+def compared(ramps: Ramps, groups: Sequence[Ramps]) -> Ramps:
+    """Ramps with systematic parts of ramp rate and dwell, by comparison with the other groups."""
     sizes = {
         (quantity, source): _shift(ramps, groups, quantity, source)
         for quantity in MEASURED
@@ -231,7 +229,7 @@ def _differ_only_in(option: str, one: Ramps, other: Ramps) -> bool:
 
 
 def _rest(ramps: Ramps, option: str) -> dict[str, Value]:
-    own = ("measurement", "position", "direction", option)
+    own = (*OF_A_RAMP, option)
     return {name: value for name, value in ramps.places[0].items() if name not in own}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.experiments.breakaway.means import QUANTITIES, Ramps, mean
 from campaign.reason import Cause
-from campaign.result import Cell, Column, Finding, Table
+from campaign.result import Cell, Column, Finding, Table, Value
 
 CHORD = Cause(
     "chord through a curve", "a chord through a curve: too low by far more than any scatter"
@@ -37,13 +37,13 @@ def findings_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]]) -> It
             yield _finding(estimate, {**shared, "direction": direction, "statistic": "mean"})
 
 
-def _finding(estimate: Estimate, place: Mapping[str, Cell]) -> Finding:
+def _finding(estimate: Estimate, place: Mapping[str, Value]) -> Finding:
     # sigma1 is computed from sigma0 and assumed numbers: no ramp measures it.
-    conditions = {name: value for name, value in place.items() if not isinstance(value, Estimate)}
-    return Finding.of(estimate, conditions, recomputed=estimate.name == "bristle_damping")
+    return Finding.of(estimate, place, recomputed=estimate.name == "bristle_damping")
 
 
-def _chord(value: float) -> Estimate:
+def chord_of(value: float) -> Estimate:
+    """A chord through the presliding curve (N m/rad), without interval."""
     return Estimate.without_interval("chord", value, "N m/rad", CHORD())
 
 
@@ -66,7 +66,7 @@ def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: 
                 "measurement": "mean",
                 "direction": direction,
                 **estimates,
-                "chord": _chord(float(np.mean(chords))) if chords else None,
+                "chord": chord_of(float(np.mean(chords))) if chords else None,
             }
         )
     return Table(

@@ -26,7 +26,15 @@ from campaign.estimation.scatter import (
     mean_of_readings,
 )
 from campaign.experiments.component_friction.figures import ComponentCurves, component_figure
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key, metrics
+from campaign.experiments.interface import (
+    Experiment,
+    TestData,
+    TrialData,
+    bench_of,
+    key,
+    metrics,
+    validated,
+)
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, of_each_place
 from campaign.options import Options
@@ -151,20 +159,16 @@ class Reading:
     torque: Estimate
 
 
-def _options(data: TrialData) -> ComponentFrictionOptions:
-    return ComponentFrictionOptions.model_validate(data.trial.options, context={"si": True})
-
-
 def _count(data: TrialData, component: str) -> float:
     """One count of the torque sensor, referred to the load (N m)."""
-    options = _options(data)
+    options = validated(ComponentFrictionOptions, data.trial.options)
     bench = bench_of(data.trial)
     return options.sensor_resolution * bench.at_load(bench.friction[component])[0]
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Reading: largest friction of the ramp, rounded to a count of the torque sensor."""
-    options = _options(data)
+    options = validated(ComponentFrictionOptions, data.trial.options)
     recording = data.recording()
     torque = breakaway_torque(
         recording.time,
@@ -264,7 +268,7 @@ def _figure(readings: list[Reading], suffix: str) -> Figure:
         )
         for name, own in _by_component(readings).items()
     ]
-    options = _options(readings[0].data)
+    options = validated(ComponentFrictionOptions, readings[0].data.trial.options)
     shared = {k: v for k, v in readings[0].place.items() if k not in OWN}
     trials = trials_of(reading.data for reading in readings)
     return component_figure(shown, shared, options.sliding_rate, trials, suffix)
@@ -299,7 +303,7 @@ def _table(readings: list[Reading], suffix: str) -> Table:
 
 
 def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
-    options = _options(first)
+    options = validated(ComponentFrictionOptions, first.trial.options)
     motor = [name for name, own in _by_component(readings).items() if _side(own[0]) == "motor"]
     gear = bench_of(first.trial).gear
     if motor and gear is not None and options.sensor_resolution > 0:

@@ -12,7 +12,7 @@ from campaign.estimate import Estimate
 from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.experiments.any_motion.motions import moved
 from campaign.experiments.excitation.options import ExcitationOptions
-from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.interface import TrialData, bench_of, validated
 from campaign.experiments.shared.common import OF_RECORDING, of_recording
 from campaign.physics.complete import limits_of
 from campaign.physics.limits import motion as asked_of
@@ -23,7 +23,7 @@ from campaign.trial import Trial
 
 def options_of(trial: Trial) -> ExcitationOptions:
     """Options of a trial, as planned."""
-    return ExcitationOptions.model_validate(trial.options, context={"si": True})
+    return validated(ExcitationOptions, trial.options)
 
 
 def measured_part(trial: Trial, recording: Recording) -> slice:

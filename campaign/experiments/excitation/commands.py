@@ -66,9 +66,7 @@ def courses(options: ExcitationOptions, bench: Bench) -> Iterator[Course]:
             used = condition(series.motion(options.position), options.terms)
             note = f"condition number {used:.3g} of {', '.join(options.terms)}"
             yield Course(series.rate, 0.0, options.periods * options.period, note)
-        case "file":
-            if options.table is None:
-                raise ValueError("signal = 'file' needs a table")
+        case "file" if options.table is not None:  # else the options are refused
             command = options.table.signal(options.command)
             note = f"{options.table.file}, {len(command.times)} rows"
             yield Course(command, 0.0, command.times[-1], note)
@@ -150,7 +148,7 @@ def _order(options: ExcitationOptions) -> int:
 def _chirp(options: ExcitationOptions) -> Course:
     sweep = chirp(options.lowest, options.highest, options.duration, options.sweep)
     time = sweep.points()
-    _check_points(len(time), "lower highest, or shorten duration")
+    _check_points(len(time))
     # A torque begins at its peak, so that a free load neither creeps nor drifts.
     values = options.size * np.sin(sweep.phase(time) + 0.5 * np.pi * _order(options))
     note = f"{options.sweep} sweep from {options.lowest:.4g} to {options.highest:.4g} Hz"
@@ -161,7 +159,7 @@ def _noises(options: ExcitationOptions) -> Iterator[Course]:
     share = max(1, int(options.sample_rate / (PER_CYCLE * options.highest) + 1e-9))
     rate = options.sample_rate / share
     count = round(options.duration * rate)
-    _check_points(count, "lower highest, or shorten duration")
+    _check_points(count)
     duration = count / rate
     seeds = [_derived(options.seed, number) for number in range(1, options.realisations + 1)]
     drawn = [
@@ -178,10 +176,11 @@ def _noises(options: ExcitationOptions) -> Iterator[Course]:
         yield Course(_polyline(time, scale * values), 0.0, duration, note, number)
 
 
-def _check_points(count: int, remedy: str) -> None:
+def _check_points(count: int) -> None:
     if count > MOST_POINTS:
         raise ValueError(
-            f"this is a polyline of {count} points, and {MOST_POINTS} are the most: {remedy}"
+            f"this is a polyline of {count} points, and {MOST_POINTS} are the most: lower highest, "
+            "or shorten duration"
         )
 
 

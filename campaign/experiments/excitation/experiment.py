@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
@@ -30,7 +29,7 @@ from campaign.experiments.interface import (
     metrics,
 )
 from campaign.experiments.responses.figures import coherence_figure, response_figures
-from campaign.experiments.responses.signals import usable
+from campaign.experiments.responses.signals import STEADY, usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
 from campaign.experiments.shared.common import conditions, joined, of_each_place
@@ -38,15 +37,12 @@ from campaign.experiments.shared.default_options import NO_ROOM, torque_above_fr
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.rounded_choices import Choices, share
 from campaign.physics.bench import Bench
-from campaign.result import Finding, Result, Value
+from campaign.result import Finding, Result
 from campaign.trial import Task, TrialRequest
 
 OWN = ("realisation",)
 """Conditions in which the trials of one group differ."""
-STEADY = "steady"
-"""The measured window."""
 READING = Reading("auto", "H1", None, None)
-Place = Mapping[str, Value]
 SWING = 0.7
 """Share of the angle limit that the default options of a rate command may use."""
 FAVARD = 0.5 * math.pi
@@ -56,11 +52,10 @@ FAVARD = 0.5 * math.pi
 def _trials(options: ExcitationOptions, bench: Bench) -> Iterator[TrialRequest]:
     moved = (RELATIVE_ANGLE,) if options.signal == "fourier" else (GYRO_RATE,)
     can_use = (GYRO_RATE,) if options.signal == "fourier" else (RELATIVE_ANGLE,)
-    mode: Literal["rate", "torque"] = options.command
     for course in courses(options, bench):
         yield TrialRequest(
             Task(
-                mode=mode,
+                mode=options.command,
                 command=course.command,
                 compensation=options.compensation,
                 duration=course.duration,

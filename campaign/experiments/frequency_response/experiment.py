@@ -49,6 +49,7 @@ from campaign.experiments.interface import (
     key,
     metrics,
 )
+from campaign.experiments.responses.signals import STEADY, steady_window
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import conditions, grouped, method_label, swept
 from campaign.experiments.shared.detected_trials import sine_response
@@ -61,7 +62,7 @@ from campaign.physics.limits import worst_friction
 from campaign.reason import Cause
 from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Sine
-from campaign.trial import NONE_MORE, Most, OfferedRecording, Task, Trial, TrialRequest
+from campaign.trial import NONE_MORE, Most, OfferedRecording, Task, TrialRequest
 from campaign.units import (
     Angle,
     AngularAcceleration,
@@ -79,8 +80,6 @@ NYQUIST_SHARE = 0.4
 """Highest measurable frequency over the controller's sample rate."""
 MOST_FREQUENCIES = 10_000
 """Most frequencies of a sweep."""
-STEADY = "steady"
-"""Window of the whole cycles that are measured."""
 
 
 class FrequencyResponseOptions(Options):
@@ -153,8 +152,10 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
     closed = options.loop == "closed"
     if closed:
         command, swing = rate_sine(bench, frequency, options.amplitude, options.max_acceleration)
+        size = rate_text(command.amplitude)
     else:
         command, swing = torque_sine(bench, frequency, options.torque, options.position)
+        size = torque_text(command.amplitude)
     return TrialRequest(
         Task(
             mode="rate" if closed else "torque",
@@ -166,7 +167,7 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
             start_angle=options.position - swing,
         ),
         point={"frequency": frequency},
-        note=f"{options.cycles} cycles after {settle} to settle; {amplitude_text(command, closed)}",
+        note=f"{options.cycles} cycles after {settle} to settle; amplitude {size}",
         requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
         windows=(Window(STEADY, start, stop),),
     )
@@ -239,16 +240,10 @@ def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: flo
     return control / max(1, math.floor(control / (options.samples_per_cycle * frequency)))
 
 
-def _steady(trial: Trial) -> tuple[float, float]:
-    """Window that is measured (s): `STEADY`, or the only window of an older trial."""
-    named = (window for window in trial.windows if window.name == STEADY)
-    return next(((window.start, window.stop) for window in named), trial.task.window)
-
-
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Response to one sine: its real and imaginary part, and the coherence."""
-    task = data.trial.task
-    recording = data.recording().window(*_steady(data.trial))
+    task, window = data.trial.task, steady_window(data.trial)
+    recording = data.recording().window(window.start, window.stop)
     drive = recording[_excitation(task.mode)]
     point = sine_point(recording.time, drive, recording[GYRO_RATE], _frequency(data))
     unit = "" if task.mode == "rate" else TORQUE_TO_RATE
@@ -340,13 +335,6 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
 
 LIMIT_SHARE = 0.9
 """Share of the bench's limits that a rate command's amplitude may use."""
-
-
-def amplitude_text(command: Sine, closed: bool) -> str:
-    """Amplitude of a rate command in a closed loop, or of a torque in an open one, in words."""
-    if closed:
-        return f"amplitude {rate_text(command.amplitude)}"
-    return f"amplitude {torque_text(command.amplitude)}"
 
 
 def rate_sine(

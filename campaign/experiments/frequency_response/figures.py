@@ -35,8 +35,7 @@ def closed_loop_figures(
     names: short names of the sweeps, for labels of their bandwidths and margins.
     """
     names = [series for _, series, _ in sweeps] if names is None else names
-    several = len(sweeps) != len({series for _, series, _ in sweeps})
-    named = [(label, label if several else series, r) for label, series, r in sweeps]
+    named = _distinct(sweeps)
     methods = {series for _, series, _ in sweeps}
     observed, modelled = "observer" in methods, bool(methods & {"lugre", "static"})
     widths = bandwidths(named, found, names)
@@ -84,9 +83,8 @@ def closed_loop_figures(
 
 def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
     """Figure 4.5: drive torque to gyro rate, and the apparent inertia."""
-    several = len(sweeps) != len({series for _, series, _ in sweeps})
-    named = [(label, label if several else series, r) for label, series, r in sweeps]
-    resonances = [mode.value for mode in modes][:1]
+    named = _distinct(sweeps)
+    resonances = tuple(Mark(f"{mode.value:.3g} Hz", x=mode.value) for mode in modes)[:1]
     bode = _bode(
         "torque-to-rate",
         "Open-loop response, drive torque to gyro rate",
@@ -97,16 +95,22 @@ def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
         Axis(gain_label("Gain")),
         named,
         thesis=("4.5",),
-        level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in resonances),
-        phase_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in resonances),
+        level_marks=resonances,
+        phase_marks=resonances,
     )
     inertia = Panel(
         FREQUENCY,
         Axis("Apparent inertia", "kg m^2", "kg m^2"),
         [Curve(r.frequency, _apparent_inertia(r), label, series) for label, series, r in named],
-        marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in resonances),
+        marks=resonances,
     )
     return replace(bode, panels=(*bode.panels, inertia))
+
+
+def _distinct(sweeps: Sequence[Named]) -> list[Named]:
+    """The sweeps; if two have one series, each with its label as the series."""
+    several = len(sweeps) != len({series for _, series, _ in sweeps})
+    return [(label, label if several else series, r) for label, series, r in sweeps]
 
 
 def _apparent_inertia(response: Response) -> Array:
@@ -130,8 +134,7 @@ def _continued(
         phase = read.crossing(read.phase_margin) if read else None
         if gain is None or phase is None or not gain.extrapolated:
             continue
-        measured = loop.told
-        beyond = Continuation.of(measured, phase.frequency.value)
+        beyond = Continuation.of(loop.told, phase.frequency.value)
         if beyond is None:
             continue
         at = np.geomspace(beyond.start, SHOWN_BEYOND * gain.frequency.value, 60)
@@ -151,8 +154,7 @@ def _with_interval(
     if not np.any(half > NOTICEABLE):
         return Curve(response.frequency, values, label, series)
     half = np.where(half > NOTICEABLE, half * per_share, np.nan)
-    low, high = values - half, values + half
-    return Curve(response.frequency, values, label, series, low=low, high=high)
+    return _within(response.frequency, values, half, label, series)
 
 
 def _bode(

@@ -86,15 +86,17 @@ def changes(sweeps: list[Sweep]) -> Iterator[Finding]:
 
 def closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
     """Tables 5.3 and 5.9, changes by compensation, and crossings of the margins."""
-    extra = [path for path in paths if path != "compensation"]
-    named = (
-        Column("compensation", "Compensation"),
-        *(Column(path, path, exact=True) for path in extra),
-    )
+    named = _place_columns(paths)
     servo, *crossings = margin_tables(sweeps, named)
     yield servo
-    yield from _effect_table(named, extra, sweeps)
+    yield from _effect_table(named, sweeps)
     yield from crossings
+
+
+def _place_columns(paths: list[str]) -> tuple[Column, ...]:
+    """Columns of the compensation and of the other swept paths."""
+    others = (Column(path, path, exact=True) for path in paths if path != "compensation")
+    return (Column("compensation", "Compensation"), *others)
 
 
 def margin_tables(sweeps: Sequence[Sweep], named: tuple[Column, ...]) -> Iterator[Table]:
@@ -115,11 +117,9 @@ def margin_tables(sweeps: Sequence[Sweep], named: tuple[Column, ...]) -> Iterato
     yield _all_crossings(named, read)
 
 
-def _effect_table(
-    named: tuple[Column, ...], extra: list[str], sweeps: list[Sweep]
-) -> Iterator[Table]:
+def _effect_table(named: tuple[Column, ...], sweeps: list[Sweep]) -> Iterator[Table]:
     rows = [
-        {**{k: sweep.place.get(k) for k in ("compensation", *extra)}, **_changes(bare, sweep)}
+        {**{c.name: sweep.place.get(c.name) for c in named}, **_changes(bare, sweep)}
         for bare, sweep in _pairs(sweeps)
     ]
     if rows:
@@ -314,8 +314,7 @@ def modes(
         key="elastic-mode",
         title="First elastic mode in the torque-to-rate response",
         columns=(
-            Column("compensation", "Compensation"),
-            *(Column(path, path, exact=True) for path in paths if path != "compensation"),
+            *_place_columns(paths),
             Column("frequency", "Resonance", "Hz", "Hz"),
             Column("antiresonance", "Antiresonance", "Hz", "Hz"),
             Column("damping_ratio", "Damping ratio"),

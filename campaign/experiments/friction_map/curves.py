@@ -1,8 +1,7 @@
 """Friction, or its coefficient, over rate: points and curves of each direction.
 
-Of runs of a map and of stretches of any recording alike: a ripple over position is taken out first,
-then there is a Stribeck curve where there are enough speeds, else a straight line, and of one speed
-the friction at it.
+For runs of a map and for stretches of any recording. A ripple over position is removed first. Many
+speeds give a Stribeck curve, fewer a straight line, one speed the friction at it.
 """
 
 from __future__ import annotations
@@ -42,15 +41,15 @@ from campaign.result import Array
 from campaign.units import rate_text
 
 ANGLE = "angle"
-"""Part of an uncertainty: what was taken off the torque by the angle."""
+"""Systematic part: torque removed by its dependence on the angle."""
 DIGITS = 6
-"""to which points may lie on a curve before nobody believes that they were measured."""
+"""Digits to which points may lie on a curve; closer points are computed, not measured."""
 ONE_SPEED = 0.02
-"""Share by which speeds of one place may differ, but for what a loop makes of them."""
+"""Largest relative difference of speeds that count as one: a loop does not reach them exactly."""
 FEWEST_SPEEDS = 7
-"""of stretches of a direction, from which on a Stribeck curve is fitted..."""
+"""Fewest speeds of stretches of a direction for a Stribeck curve ..."""
 FEWEST_RUNS = 6
-"""...and of runs, whose windows are long and settled."""
+"""... and of runs, whose windows are long and settled."""
 MEANINGS = {
     "coulomb_torque": ("N m", "Dry friction of fast sliding"),
     "static_torque": ("N m", "Friction at the onset of sliding"),
@@ -63,11 +62,11 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is mapped: friction, or friction over normal load.
+    """Friction, or friction over normal load.
 
     Attributes:
         name: in the names of parameters: `coulomb_torque`, `coulomb_coefficient`.
-        per_torque: what the torque of a point is multiplied by.
+        per_torque: factor on the torque of a point.
         meanings: unit and meaning of each parameter, by its name.
         axis: of its figure: label, SI unit, display unit.
     """
@@ -78,7 +77,7 @@ class Quantity:
     axis: tuple[str, str, str]
 
     def called(self, parameter: str) -> str:
-        """A parameter's name."""
+        """Name of a parameter of this quantity."""
         if self.name == "torque":
             return parameter
         called = {"viscous_friction": f"viscous_{self.name}", "friction": f"friction_{self.name}"}
@@ -102,18 +101,19 @@ COEFFICIENT = Quantity(
 
 @dataclass(frozen=True)
 class Curves:
-    """One quantity over rate: its points, and what was fitted to those of each direction, by it.
+    """Points of one quantity over rate, and their fits by direction.
 
     Attributes:
-        points: by direction; `ripple` is set where one was taken out.
-        first: a trial, which says how well constants of the torque and the load are known.
-        force: the channel that the torque was read from.
-        ripples: None where the points share none.
-        shift: what residual acceleration contributes to each value of a fit, as a share of J; (n,).
-        others: parameters of a line or a mean, by name, with what scatters.
-        moved: what residual acceleration contributes to those.
-        doubts: of direction and parameter, what was taken off by the angle (1 sigma).
-        notes: what was fitted, and what is not told.
+        points: both directions; `ripple` is set where one was removed.
+        first: a trial, which states the uncertainty of torque and load.
+        force: channel of the torque.
+        ripples: None without a common ripple of the points.
+        fits, lines: Stribeck curves, or straight lines.
+        others: parameters of a line or a mean, by name, with intervals by scatter.
+        shift: J times the residual acceleration at each value of a fit, shape (n,).
+        moved: the same for each parameter of `others`.
+        doubts: uncertainty by the torque removed by angle (1 sigma), by direction and parameter.
+        notes: sentences on the fits, and on missing ones.
     """
 
     quantity: Quantity
@@ -145,9 +145,9 @@ class Curves:
         return {way: told[way] for way in DIRECTIONS if way in told}
 
     def estimates(self, model: Model) -> dict[str, dict[str, Estimate]]:
-        """Of a map, by direction, `nominal` behind both; then by name. Systematic parts included.
+        """Parameters of a map by direction, `nominal` last; then by name. With systematic parts.
 
-        Those of the nominal are the mean of both directions: one constant moves both.
+        Those of the nominal are the mean of both directions: one constant shifts both.
         """
         if model not in self._told:
             effects = [shifts(self.fits[way].fits[model], self.shift[way]) for way in DIRECTIONS]
@@ -167,7 +167,7 @@ class Curves:
         return direction_estimates(fit, model, lambda one: self._shared(one, way, effects))
 
     def _shared(self, one: Estimate, way: str, effects: Mapping[str, float]) -> Estimate:
-        """With what was taken off by the angle, and constants."""
+        """Add the systematic parts of the torque removed by angle, and of constants."""
         one = drop_interval_if_deterministic(one, abs(one.value), DIGITS)
         if not one.has_interval and one.name != "friction":
             return one
@@ -176,21 +176,20 @@ class Curves:
         return self.with_constants(one, effects.get(one.name, 0.0))
 
     def with_constants(self, one: Estimate, moved: float = 0.0) -> Estimate:
-        """What follows from several points, with what none of them shows."""
+        """A number of several points, with the parts of constants, which no point shows."""
         loaded, scales = self.quantity is COEFFICIENT, not one.name.startswith("stribeck")
         return with_constants(one, self.first, self.force, moved, scales=scales, loaded=loaded)
 
     def read(self, point: Point) -> Estimate:
-        """What a point shows, signed, with what its window shows alone."""
+        """The quantity at a point, signed, with the interval of its window alone."""
         if self.quantity is FRICTION:
             return point.torque
         return multiplied(coefficient_of(point, self.first), point.sign)
 
     def curve(self, way: str, speed: Array, model: Model | None = None) -> list[Array]:
-        """What was fitted at `speed`, shape (n,), and both ends of its 95 % band; none of a mean.
+        """Fit at `speed`, shape (n,), and both ends of its 95 % band; empty for a mean.
 
-        All positive where friction acts against the motion; of the accepted model, if none is
-        named.
+        Positive against the motion. model: the accepted one if None.
         """
         if way in self.fits:
             fit = self.fits[way]
@@ -215,7 +214,7 @@ def fit_curves(
     Args:
         points: in order of time.
         first: one of their trials.
-        force: the channel that their torque was read from.
+        force: channel of their torque.
     """
     curves, kept = Curves(quantity, (), first, force), []
     for name, sign in DIRECTIONS.items():
@@ -238,7 +237,7 @@ def fit_curves(
 
 
 def fit_map(points: Sequence[Point], first: TrialData) -> Curves:
-    """The Stribeck curves of both directions. Raises ValueError where one has too few speeds."""
+    """Stribeck curves of both directions. Raises ValueError if one has too few speeds."""
     curves = fit_curves(points, first)
     if not curves.is_map:
         raise ValueError("; ".join(note.rstrip(".") for note in curves.notes))
@@ -246,12 +245,12 @@ def fit_map(points: Sequence[Point], first: TrialData) -> Curves:
 
 
 def _fit(curves: Curves, name: str, own: Sequence[_Averaged]) -> None:
-    """What points of one direction show, into `curves`; what is not told goes to its notes."""
+    """Fit the points of one direction, and add the result and its notes to `curves`."""
     sign, quantity, notes = DIRECTIONS[name], curves.quantity, curves.notes
     speed = np.array([abs(each.rate) for each in own])
     values = sign * np.array([each.value for each in own])
     error = np.array([each.error for each in own])
-    # Without an inertia the part is unknown, whatever stands here: `with_systematic`.
+    # Without an inertia the part is unknown for any number here: `with_systematic`.
     inertia = bench_of(curves.first.trial).axis.inertia or 0.0
     moved = sign * inertia * np.array([each.acceleration for each in own])
     commanded = [abs(each.commanded) for each in own if each.commanded is not None]
@@ -262,7 +261,7 @@ def _fit(curves: Curves, name: str, own: Sequence[_Averaged]) -> None:
     if len(distinct) >= fewest:
         try:
             fit = fit_direction(speed, values, error, place)
-        except ValueError as problem:  # of a bench without friction there is no curve
+        except ValueError as problem:  # a bench without friction has no curve
             why = str(problem)
         else:
             curves.fits[name] = fit
@@ -297,8 +296,8 @@ def _fit(curves: Curves, name: str, own: Sequence[_Averaged]) -> None:
 
 
 def _stribeck_part(fit: DirectionFit) -> str:
-    """Whether friction falls or rises as sliding sets in, in words."""
-    # What is told by a line shows no Stribeck part, whatever a free curve could be bent to.
+    """Whether friction falls or rises at the onset of sliding, in words."""
+    # An accepted line shows no Stribeck part, for any free curve.
     if not fit.shows_stribeck_effect or fit.accepted == "none":
         return (
             "static friction is not distinguishable from Coulomb friction: there is no Stribeck "
@@ -311,7 +310,7 @@ def _stribeck_part(fit: DirectionFit) -> str:
 
 
 def places(speed: Array) -> Array:
-    """Which speeds are one, shape (n,): within 2 % of the slowest of them."""
+    """Number of the place of each speed, shape (n,): one place is within 2 % of its slowest."""
     place, first, number = np.empty(len(speed)), math.nan, -1
     for index in np.argsort(speed):
         if not speed[index] <= first * (1.0 + ONE_SPEED):
@@ -329,28 +328,27 @@ def dry_torques(points: Sequence[Point]) -> Array:
 
 
 def without_ripple(points: Sequence[Point]) -> tuple[list[Point], Ripple | None]:
-    """The points of one direction, told how much of each torque is ripple, and that ripple."""
-    told = list(points)
-    if len(told) <= len(PARAMETERS) or not any(point.harmonic for point in told):
-        return told, None
-    first, last = (np.array([getattr(p, end) for p in told]) for end in ("first", "last"))
-    harmonics = [point.harmonic for point in told]
-    dry = dry_torques(told)
+    """Points of one direction, each with its part of their common ripple, and that ripple."""
+    if len(points) <= len(PARAMETERS) or not any(point.harmonic for point in points):
+        return list(points), None
+    first, last = (np.array([getattr(p, end) for p in points]) for end in ("first", "last"))
+    harmonics = [point.harmonic for point in points]
+    dry = dry_torques(points)
     taken, error, ripple = ripple_of_points(harmonics, dry, first, last)
     if ripple is None:
-        return told, None
-    noise = window_noise(np.array([point.error for point in told]), ripple, first, last, dry)
+        return list(points), None
+    noise = window_noise(np.array([point.error for point in points]), ripple, first, last, dry)
     return [
         replace(point, ripple=float(t), error=float(np.hypot(n, e)))
-        for point, t, n, e in zip(told, taken, noise, error, strict=True)
+        for point, t, n, e in zip(points, taken, noise, error, strict=True)
     ], ripple
 
 
 @dataclass(frozen=True)
 class _Averaged:
-    """Points of one speed and repetition, from all angles that it began at; a stretch by itself.
+    """Mean of the points of one speed and repetition over all start angles; of one stretch.
 
-    acceleration: by which inertia contributes to the value (of a coefficient over the load, too).
+    acceleration: times the inertia, its contribution to the value.
     """
 
     commanded: float | None
@@ -363,8 +361,8 @@ class _Averaged:
 def _over_starts(points: Sequence[Point], quantity: Quantity) -> Iterator[_Averaged]:
     groups: dict[tuple[float, int], list[Point]] = {}
     for number, point in enumerate(points):
-        single = point.commanded is None
-        key = (number, -1) if single else (point.speed, point.repeat)
+        is_stretch = point.commanded is None
+        key = (number, -1) if is_stretch else (point.speed, point.repeat)
         groups.setdefault(key, []).append(point)
     for group in groups.values():
         by = [quantity.per_torque(p) for p in group]

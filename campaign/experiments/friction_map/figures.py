@@ -15,7 +15,7 @@ from campaign.estimation.stribeck import UNITS, stribeck
 from campaign.estimation.velocity_map import DirectionFit, Model, band
 from campaign.experiments.friction_map.curves import FRICTION, Curves
 from campaign.experiments.friction_map.points import Point
-from campaign.experiments.friction_map.runs import DIRECTIONS, windows_of
+from campaign.experiments.friction_map.runs import DIRECTIONS, speed_of, windows_of
 from campaign.experiments.friction_map.tables import MODEL_LABELS, fitted_torque
 from campaign.experiments.interface import TestData, with_samples
 from campaign.experiments.shared.captions import amount, listed, sentence, setting, surely_above
@@ -294,7 +294,7 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
     recording = item.recording().window(0.0, back.start - window.start)
     marks = (Mark("averaged", x=window.start, until=window.stop),)
     time = Axis("Time", "s", "s")
-    speed = setting(float(str(item.trial.point["speed"])), "rad/s", "deg/s")
+    speed = setting(speed_of(item.trial), "rad/s", "deg/s")
     rates = [Curve(recording.time, recording[GYRO_RATE], "measured", "measured")]
     if COMMAND in recording.channels:
         command = recording[COMMAND]

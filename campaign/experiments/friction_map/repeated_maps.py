@@ -44,6 +44,11 @@ class MapSet:
         return self.found[direction][parameter].value
 
 
+def by_map(sets: Sequence[MapSet], parameter: str) -> Array:
+    """Values of a parameter, shape (maps, directions)."""
+    return np.array([[each.value(name, parameter) for name in DIRECTIONS] for each in sets])
+
+
 def overlay_figure(sets: Sequence[MapSet], trials: tuple[int, ...]) -> Figure:
     """Figure 4.9: maps on one another, and their differences from the first."""
     shown = list(sets[:SHOWN])
@@ -96,7 +101,8 @@ def _drifts(sets: Sequence[MapSet]) -> str:
         for direction in DIRECTIONS:
             _, change = _change(sets[0], each, direction)
             if len(change):
-                ends = [amount(float(end), "N m", digits=2) for end in _ends(change)]
+                extremes = (np.min(change), np.max(change))
+                ends = [amount(float(end), "N m", digits=2) for end in extremes]
                 mean = amount(float(np.mean(change)), "N m", digits=2)
                 words.append(f"{mean} ({ends[0]} to {ends[1]}) {direction}")
         if words:
@@ -105,10 +111,6 @@ def _drifts(sets: Sequence[MapSet]) -> str:
         return ""
     of_first = f"Difference from sets {sets[0].name}, mean and range over the speeds"
     return f" {of_first}: {'; '.join(parts)}."
-
-
-def _ends(values: Array) -> tuple[float, float]:
-    return float(np.min(values)), float(np.max(values))
 
 
 def scatter_figure(
@@ -164,7 +166,7 @@ def _apart(sets: Sequence[MapSet], means: Mapping[str, Estimate]) -> str:
     level = 1.0 - (1.0 - LEVEL) / len(means)
     apart = []
     for name in means:
-        each = np.array([[one.value(d, name) for d in DIRECTIONS] for one in sets])
+        each = by_map(sets, name)
         if _differs(each[:, 1] - each[:, 0], level, ROUNDING * float(np.max(np.abs(each)))):
             apart.append(SYMBOLS[name])
     if not apart:

@@ -258,16 +258,13 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
 
 def settling_notes(trials: Iterable[Trial]) -> Iterator[str]:
     """Advice for maps whose runs settle for too short an angle, one note per bench."""
-    runs: dict[str, list[tuple[float, float]]] = {}
-    rigs: dict[str, Rig] = {}
+    by_bench: dict[str, list[Trial]] = {}
     for trial in trials:
-        if trial.task.mode == "recorded":  # its settling was not planned
-            continue
-        key = canonical_json(trial.bench)
-        rigs.setdefault(key, rigs.get(key) or Rig(bench_of(trial)))
-        runs.setdefault(key, []).append((speed_of(trial), settled_angle(trial)))
-    for key, own in runs.items():
-        where, advice = settling_of_runs(rigs[key], own)
+        if trial.task.mode != "recorded":  # else its settling was not planned
+            by_bench.setdefault(canonical_json(trial.bench), []).append(trial)
+    for own in by_bench.values():
+        runs = [(speed_of(trial), settled_angle(trial)) for trial in own]
+        where, advice = settling_of_runs(Rig(bench_of(own[0])), runs)
         if advice:
             yield f"At {where}: {advice}."
 
@@ -330,17 +327,19 @@ def run_requests(
         )
 
 
-def _starts(
-    options: VelocityMapOptions, run: Run | None = None, number: int = 0, limit: float = 0.0
-) -> tuple[float, ...]:
-    """Start angles (rad) of the warm-up, or of a run on an axis with that limit.
+def _stated_starts(options: VelocityMapOptions) -> tuple[float, ...]:
+    """Start angles (rad) of the warm-up, and of all runs if they are not spread."""
+    return options.start_angles or (-0.5 * options.max_travel,)
+
+
+def _starts(options: VelocityMapOptions, run: Run, number: int, limit: float) -> tuple[float, ...]:
+    """Start angles (rad) of a run on an axis with that limit.
 
     Starts spread over half of the angle between the limits, or a quarter turn without limits. Over
     the travel of the fastest run alone, all fast runs would see a long ripple at one place.
     """
-    lowest = -0.5 * options.max_travel
-    if options.start_angles or run is None or not options.spread_starts:
-        return options.start_angles or (lowest,)
+    if options.start_angles or not options.spread_starts:
+        return _stated_starts(options)
     room = max(options.max_travel, limit if math.isfinite(limit) else 0.5 * math.pi)
     left = max(room - run.speed * (run.ramp + run.cruise), 0.0)
     return (-0.5 * room + number / GOLDEN % 1.0 * left,)
@@ -348,11 +347,8 @@ def _starts(
 
 def warm_ups(options: VelocityMapOptions) -> Iterator[TrialRequest]:
     """Request of the warm-up, if one is wanted."""
-    if options.warm_up_cycles:
-        yield _warm_up(options, _starts(options)[0])
-
-
-def _warm_up(options: VelocityMapOptions, start_angle: float) -> TrialRequest:
+    if not options.warm_up_cycles:
+        return
     relaxed = options.model_copy(update={"settle_time": 0.0, "settle_angle": 0.0})
     run = plan_run(options.warm_up_speed, relaxed)
     once = run.command()
@@ -360,14 +356,14 @@ def _warm_up(options: VelocityMapOptions, start_angle: float) -> TrialRequest:
     for cycle in range(options.warm_up_cycles):
         times += [cycle * once.times[-1] + t for t in once.times[1:]]
         values += once.values[1:]
-    return TrialRequest(
+    yield TrialRequest(
         Task(
             mode="rate",
             command=Polyline(times=tuple(times), values=tuple(values)),
             duration=times[-1] + options.rest,
             window=(0.0, times[-1]),
             sample_rate=options.sample_rate,
-            start_angle=start_angle,
+            start_angle=_stated_starts(options)[0],
         ),
         role=Role.WARM_UP,
         point={"speed": options.warm_up_speed},

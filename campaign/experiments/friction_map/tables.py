@@ -31,7 +31,7 @@ OF_SAMPLES = Cause("describes the window's samples", "it describes the window's 
 OF_RESIDUALS = Cause("describes the residuals", "it describes the residuals")
 CRITERION = Cause("criterion", "a criterion to compare models by")
 MISFIT = 2.0
-"""by which the residuals of delta = 2 exceed those of delta free, to be told."""
+"""Ratio of the residuals of delta = 2 to those of delta free, above which a note states it."""
 
 
 def map_findings(fits: Curves, place: Mapping[str, Value]) -> Iterator[Finding]:

@@ -16,7 +16,7 @@ from pydantic import Field, JsonValue
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.sampled_curve import LOST, at_sample, bracketed, named, peak
-from campaign.experiments.interface import Experiment, TestData, TrialData, key
+from campaign.experiments.interface import Experiment, TestData, TrialData, key, validated
 from campaign.experiments.model_output.figures import (
     UNCHANGED,
     cycle,
@@ -31,6 +31,7 @@ from campaign.experiments.shared.common import (
     conditions,
     grouped,
     parameter_paths,
+    suffixes,
     with_changes,
 )
 from campaign.experiments.shared.friction_models import (
@@ -152,16 +153,15 @@ def _analyse(data: TestData) -> Result:
             ]
     if not rows:
         return Result()
-    options = ModelOutputOptions.model_validate(measured[0].trial.options, context={"si": True})
+    options = validated(ModelOutputOptions, measured[0].trial.options)
     figures: list[Figure] = []
-    for number, place in enumerate(plain, start=1):
-        suffix = f"-{number}" if len(plain) > 1 else ""
+    for place, suffix in zip(plain, suffixes(len(plain)), strict=True):
         figures += [
             static_figure(place.trials[0], suffix, options.amplitude),
             sine_figure(place.trials, suffix),
         ]
-    for number, place in enumerate(varied, start=1):
-        figures += variation_figures(place.trials, f"-{number}" if len(varied) > 1 else "")
+    for place, suffix in zip(varied, suffixes(len(varied)), strict=True):
+        figures += variation_figures(place.trials, suffix)
     table = Table(
         key="model-output",
         title="Output of the models at a sinusoidal rate",

@@ -8,7 +8,7 @@ import numpy as np
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.experiments.interface import TrialData, bench_of
-from campaign.experiments.shared.common import method_label
+from campaign.experiments.shared.common import closed, method_label
 from campaign.experiments.shared.friction_models import PARAMETER_LABELS, model_label, model_series
 from campaign.physics.steady_friction import steady_friction
 from campaign.recording import Recording
@@ -89,7 +89,7 @@ def sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
         name = str(point.get("compensation", model_series(str(point.get("model", "none")))))
         thin = compensated and "compensation" not in point
         style: Style = "thin" if thin else "line"
-        curves.append(Curve(*_closed(cut[LOAD_RATE], torque), source(item), name, style))
+        curves.append(Curve(*closed(cut[LOAD_RATE], torque), source(item), name, style))
     near = NEAR_ZERO * max(_largest(curve.x) for curve in curves)
     zoom = Axis(RATE.label, "rad/s", "deg/s", limits=(-near, near))
     mark = (Mark("", x=0.0),)
@@ -125,13 +125,9 @@ def _left(trials: Sequence[TrialData]) -> list[Curve]:
             continue
         cut, torque = cycle(item)
         if len(torque) == len(friction):
-            rest = _closed(cut[LOAD_RATE], friction - torque)
+            rest = closed(cut[LOAD_RATE], friction - torque)
             curves.append(Curve(*rest, source(item), str(name)))
     return curves
-
-
-def _closed(rate: Array, torque: Array) -> tuple[Array, Array]:
-    return np.append(rate, rate[0]), np.append(torque, torque[0])
 
 
 def _largest(rate: Array) -> float:
@@ -204,7 +200,7 @@ def _variation(
         cut, torque = cycle(item)
         series = "reference" if factor == 1.0 else f"factor {factor:g}"
         label = UNCHANGED if factor == 1.0 else f"× {factor:g}"
-        curves.append(Curve(*_closed(cut[LOAD_RATE], torque), label, series))
+        curves.append(Curve(*closed(cut[LOAD_RATE], torque), label, series))
     largest = _largest(curves[0].x)
     shown = NEAR_ZERO * largest if near_zero else largest
     axis = Axis(RATE.label, "rad/s", "deg/s", limits=(-1.02 * shown, 1.02 * shown))

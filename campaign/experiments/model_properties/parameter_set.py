@@ -42,10 +42,8 @@ def options_of(model: str, given: Mapping[str, JsonValue], *, own: bool) -> Fric
 
 def with_friction(bench: Bench, options: FrictionOptions) -> Tree:
     """The normalized bench with this friction as its only interface, named as its first."""
-    described: Tree = bench.with_friction({next(iter(bench.friction)): options}).model_dump(
-        mode="json"
-    )
-    return described
+    name = next(iter(bench.friction))
+    return bench.with_friction({name: options}).model_dump(mode="json")
 
 
 def _dry(options: Any, rate: float) -> float:

@@ -16,10 +16,10 @@ import numpy as np
 from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.experiments import force_rate, friction_lag, stribeck_curve
-from campaign.experiments.interface import Experiment, TrialData
+from campaign.experiments.interface import ChangedTrial, Experiment, TrialData
 from campaign.experiments.model_properties.parameter_set import Scale
 from campaign.experiments.model_properties.rules import CLOSES, LOSS, REVERSIBLE
-from campaign.experiments.presliding_hysteresis import Loop
+from campaign.experiments.presliding_hysteresis import loop_sizes
 from campaign.experiments.stick_slip import EXPERIMENT as STICK_SLIP
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -172,21 +172,6 @@ class Part:
     requires: frozenset[str] = frozenset({FRICTION_TORQUE, RELATIVE_ANGLE})
 
 
-@dataclass(frozen=True)
-class _AsIf:
-    """A trial with the options of another experiment."""
-
-    data: TrialData
-    options: Any
-
-    @property
-    def trial(self) -> Any:
-        return self.data.trial.model_copy(update={"options": self.options.model_dump(mode="json")})
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.data, name)
-
-
 def _like(experiment: Experiment, options: Callable[[Scale], Mapping[str, Any]]) -> Part:
     """A part with the trials and metrics of another experiment."""
     own: Any = experiment.measure
@@ -195,8 +180,8 @@ def _like(experiment: Experiment, options: Callable[[Scale], Mapping[str, Any]])
         return experiment.options.model_validate(options(scale), context={"si": True})
 
     def measure(data: TrialData, scale: Scale) -> Mapping[str, float]:
-        seen: Any = _AsIf(data, chosen(scale))
-        return {each.name: each.value for each in own(seen)}
+        like = ChangedTrial(data, (), options=chosen(scale).model_dump(mode="json"))
+        return {each.name: each.value for each in own(like)}
 
     needed = frozenset(experiment.requires)
     return Part(lambda scale, bench: experiment.trials(chosen(scale), bench), measure, needed)
@@ -224,7 +209,7 @@ def presliding_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
         around = slice(ends[1] + max(int(below[0]) - 1, 0), ends[1] + int(below[0]) + 1)
         zero = float(np.interp(0.0, torque[around][::-1], x[around][::-1]))
     loop = slice(ends[1], ends[3] + 1)
-    loss = Loop(x[loop], torque[loop]).sizes(amplitude)["loss_factor"]
+    loss = loop_sizes(x[loop], torque[loop], amplitude)["loss_factor"]
     missed = abs(float(torque[ends[7]] - torque[ends[5]])) / max(outer, 1e-12)
     return {
         "reversible_share": max(1.0 - zero / amplitude, 0.0),

@@ -23,7 +23,7 @@ from campaign.channels import (
 from campaign.estimate import Estimate
 from campaign.experiments.friction_map.stretches import StretchOptions, force_of
 from campaign.experiments.friction_map.tables import point_table
-from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics, validated
 from campaign.experiments.motion.account import (
     account_of,
     line_table,
@@ -31,7 +31,7 @@ from campaign.experiments.motion.account import (
     summary_table,
 )
 from campaign.experiments.motion.figures import friction_figure, motion_figure
-from campaign.experiments.shared.common import COUNTED, of_recording
+from campaign.experiments.shared.common import COUNTED, of_recording, suffixes
 from campaign.experiments.shared.recorded_motion import nothing_to_plan
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
@@ -107,18 +107,16 @@ def _analyse(data: TestData) -> Result:
         account_of(
             item,
             metrics(item, _measure),
-            MotionOptions.model_validate(item.trial.options, context={"si": True}),
+            validated(MotionOptions, item.trial.options),
             notes,
         )
         for item in data.completed()
     ]
     if not motions:
         return Result()
-    several = len(motions) > 1
     tables = [summary_table(motions)]
     figures = []
-    for number, motion in enumerate(motions, start=1):
-        suffix = f"-{number}" if several else ""
+    for motion, suffix in zip(motions, suffixes(len(motions)), strict=True):
         figures.append(motion_figure(motion, suffix))
         if motion.sliding.maps:
             figures.append(friction_figure(motion, suffix))

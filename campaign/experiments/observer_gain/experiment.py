@@ -25,6 +25,7 @@ from campaign.experiments.interface import (
     TestData,
     bench_of,
     key,
+    validated,
 )
 from campaign.experiments.observer_gain.figures import (
     error_figure,
@@ -185,7 +186,7 @@ def _rejection_task(options: ObserverGainOptions, name: str, frequency: float) -
 def _analyse(data: TestData) -> Result:
     if not data.trials:
         return Result()
-    options = ObserverGainOptions.model_validate(data.trials[0].trial.options, context={"si": True})
+    options = validated(ObserverGainOptions, data.trials[0].trial.options)
     bench = complete(bench_of(data.trials[0].trial), "the theory of an observer")
     own, inertia = own_observer(bench, options.observer)
     groups = by_value(data.trials, "corner")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from campaign.estimate import Estimate
 from campaign.experiments.observer_gain.metrics import Gain
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
@@ -17,8 +17,8 @@ SHOWN_GAINS = 4
 """Curves in the figure of rejection, including the one without observer."""
 
 
-def _pairs(gains: Sequence[Gain], name: str) -> tuple[Array, list[Estimate]]:
-    """Corner frequencies and estimates of stable gains with an observer and an estimate."""
+def _pairs(gains: Sequence[Gain], name: str) -> tuple[Array, list[Any]]:
+    """Corner frequencies and results of stable gains with an observer and this result."""
     stable = [(g.corner, getattr(g, name)) for g in gains if g.corner and not g.unstable]
     known = [(corner, value) for corner, value in stable if value is not None]
     return np.array([corner for corner, _ in known]), [value for _, value in known]
@@ -52,7 +52,7 @@ def _stability_words(gains: Sequence[Gain]) -> str:
     return f" The loop is stable at every gain that was tried, up to {highest:.3g} Hz."
 
 
-def error_figure(gains: Sequence[Gain], own: float, limit: float | None = None) -> Iterator[Figure]:
+def error_figure(gains: Sequence[Gain], own: float, limit: float | None) -> Iterator[Figure]:
     """Stabilization error over the gain."""
     x, y = _pairs(gains, "error")
     if not len(x):
@@ -76,16 +76,14 @@ def error_figure(gains: Sequence[Gain], own: float, limit: float | None = None) 
     )
 
 
-def noise_figure(gains: Sequence[Gain], own: float, limit: float | None = None) -> Iterator[Figure]:
+def noise_figure(gains: Sequence[Gain], own: float, limit: float | None) -> Iterator[Figure]:
     """True rate of the load that the gyro's noise causes, over the gain."""
     x, y = _pairs(gains, "noise")
     if not len(x):
         return
-    stable = [gain for gain in gains if gain.corner and not gain.unstable]
-    theory = [(g.corner, g.noise_theory) for g in stable if g.noise_theory is not None]
-    equation = np.array(theory, dtype=float).reshape(-1, 2)
+    theory_x, theory_y = _pairs(gains, "noise_theory")
     curves = [
-        Curve(equation[:, 0], equation[:, 1], "Equation 5.5", "fit"),
+        Curve(theory_x, np.array(theory_y, dtype=float), "Equation 5.5", "fit"),
         Curve.of(x, y, "measured", "measured"),
     ]
     rate = Axis("Rate of the load from noise (1σ)", "rad/s", "mrad/s", scale="log")

@@ -88,10 +88,6 @@ def is_noisy(bench: Bench) -> bool:
     return control_rate(bench) is not None and bench.sensors.gyro.noise > 0
 
 
-def _corner(data: TrialData) -> float:
-    return float(str(data.trial.point["corner"]))
-
-
 def _place(data: TrialData) -> dict[str, JsonValue]:
     """Sweep point of a trial without its gain."""
     return {name: value for name, value in data.trial.point.items() if name != "corner"}
@@ -117,7 +113,8 @@ def _measured(data: TrialData, cut: Recording) -> Iterator[Estimate]:
         yield error_of(cut, task)
         if FRICTION_TORQUE in cut.channels:
             bench = _bench(data)
-            value = predicted_error(cut, bench, _corner(data), _inertia(data, bench))
+            corner = float(str(data.trial.point["corner"]))
+            value = predicted_error(cut, bench, corner, _inertia(data, bench))
             yield Estimate.without_interval(ERROR_THEORY, value, "rad", BY_THEORY())
     elif measured == "noise" and LOAD_RATE in cut.channels:
         yield over_blocks(cut[LOAD_RATE], NOISE, "rad/s")

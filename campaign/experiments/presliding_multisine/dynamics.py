@@ -18,6 +18,7 @@ from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.presliding_multisine.held_current import between_samples
 from campaign.experiments.shared.captions import amount
+from campaign.experiments.shared.common import correlations
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.physics.bench import Bench
 from campaign.physics.loop import viscous_at_load
@@ -298,12 +299,11 @@ def remarks(found: PreslidingDynamics) -> Iterator[str]:
             continue  # only their sum is reported
         if each.origin in (Origin.NOT_DETERMINED, Origin.AT_BOUND) and not found.reason:
             yield f"{NAMES.get(name, name).replace('_', ' ').capitalize()}: {each.reason}."
-    names, shares = found.fit.parameters.names, found.spread.correlation
-    for i, one in enumerate(names):
-        for j, other in enumerate(names[:i]):
-            if abs(shares[i, j]) >= 0.9 and not {one, other} & {*SPLIT, "yielding"}:
-                pair = [NAMES.get(n, n).replace("_", " ") for n in (other, one)]
-                yield f"{pair[0]} and {pair[1]} are correlated ({shares[i, j]:.3f})."
+    pairs = correlations(found.fit.parameters.names, found.spread.correlation)
+    for (one, other), share in pairs.items():
+        if abs(share) >= 0.9 and not {one, other} & {*SPLIT, "yielding"}:
+            pair = [NAMES.get(n, n).replace("_", " ") for n in (other, one)]
+            yield f"{pair[0]} and {pair[1]} are correlated ({share:.3f})."
     if np.any(np.isfinite(found.spread.freedom)):
         yield (
             "The trials differ by more than their noise: intervals are from how they differ. "

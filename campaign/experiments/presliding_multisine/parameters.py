@@ -16,9 +16,11 @@ from campaign.estimation.intervals import shifted_by
 from campaign.estimation.presliding_dynamics.fit_result import unexplained
 from campaign.estimation.presliding_dynamics.presliding_fit import PreslidingDynamics
 from campaign.estimation.presliding_dynamics.record import Record
-from campaign.experiments.interface import TestData, TrialData
+from campaign.experiments.interface import TestData
 from campaign.experiments.presliding_multisine.dynamics import viscous_of
 from campaign.experiments.presliding_multisine.small_motions import records_of, usable
+from campaign.experiments.shared.common import correlations
+from campaign.experiments.shared.recorded_motion import validation_of
 from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -63,7 +65,7 @@ def identified(
     """
     bench = data.bench
     told = told | _bristle_damping(told, bench, data.model.viscous_friction)
-    unseen = _unseen(data.validation)
+    unseen = records_of(validation_of(data, usable))
     missed = [unexplained(found.fit, each) for each in unseen]
     return (
         IdentifiedRig(
@@ -74,16 +76,6 @@ def identified(
         _missed_table(found, unseen, missed),
         tuple(_notes(bench, found, planned)),
     )
-
-
-def _unseen(trials: Sequence[TrialData]) -> list[Record]:
-    """Records of a validation that stay below breakaway. Raises ValueError if there are none."""
-    if not trials:
-        return []
-    chosen, why = usable(trials)
-    if why:
-        raise ValueError(f"of the validation {why}")
-    return records_of(chosen)
 
 
 def _bristle_damping(
@@ -192,6 +184,5 @@ def _notes(bench: Bench, found: PreslidingDynamics, planned: bool) -> Iterator[s
 def _correlations(found: PreslidingDynamics) -> dict[tuple[str, str], float]:
     """Correlations by parameter names; the bristles' damping has those of all damping."""
     names = {"bristle_stiffness": "stiffness_at_rest", "damping": "bristle_damping"}
-    matrix = found.spread.correlation
     own = [names.get(each, each) for each in found.fit.parameters.names]
-    return {(own[i], own[j]): float(matrix[i, j]) for i in range(len(own)) for j in range(i)}
+    return correlations(own, found.spread.correlation)

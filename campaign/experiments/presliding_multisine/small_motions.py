@@ -12,7 +12,7 @@ from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_
 from campaign.estimation.inverse.motion import whole_pieces
 from campaign.estimation.presliding_dynamics.record import FEWEST, Assumptions, Record
 from campaign.estimation.presliding_dynamics.start import first_plant
-from campaign.experiments.interface import TrialData
+from campaign.experiments.interface import TrialData, validated
 from campaign.experiments.presliding_multisine.dynamics import record_of, with_torques_known
 from campaign.options import Options
 from campaign.signals import Zero
@@ -157,7 +157,7 @@ def _span(data: TrialData, record: Record) -> tuple[float, float]:
 
 def options_of(data: TrialData) -> PreslidingMultisineOptions:
     """Options of a planned trial."""
-    return PreslidingMultisineOptions.model_validate(data.trial.options, context={"si": True})
+    return validated(PreslidingMultisineOptions, data.trial.options)
 
 
 def slides(record: Record) -> str:

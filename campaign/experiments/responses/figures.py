@@ -84,7 +84,7 @@ def panels(
     half = 1.96 * measured.widened / size
     known = half < 1.0
     half = np.where(known, half, np.nan)
-    level = DECIBEL * np.log(size)
+    level = decibel(size)
     phase = turned(np.unwrap(np.angle(measured.values)))
     down = np.where(known, DECIBEL * np.log(np.maximum(1.0 - half, 1e-3)), np.nan)
     up = DECIBEL * np.log(1.0 + half)
@@ -96,7 +96,7 @@ def panels(
         Curve(x, phase, "measured", "measured", "points", low=phase - wide, high=phase + wide)
     ]
     for name, at, values in lines:
-        gains.append(Curve(at, DECIBEL * np.log(np.maximum(np.abs(values), 1e-300)), name, name))
+        gains.append(Curve(at, decibel(np.abs(values)), name, name))
         own = np.unwrap(np.angle(values))
         interpolated = np.interp(np.log(x), np.log(at), own)
         own = own + 2.0 * np.pi * np.round(np.median(phase - interpolated) / (2.0 * np.pi))
@@ -117,14 +117,14 @@ def turned(phase: Array) -> Array:
 
 def _left(measured: MeasuredResponse, model: ComplexArray) -> Panel:
     x = measured.frequency
-    left = np.maximum(np.abs(measured.values - model), 1e-300)
-    scatter = np.maximum(np.sqrt(measured.variance + measured.bias**2), 1e-300)
+    left = decibel(np.abs(measured.values - model))
+    scatter = decibel(np.sqrt(measured.variance + measured.bias**2))
     return Panel(
         FREQUENCY,
         Axis(gain_label("Left over")),
         [
-            Curve(x, DECIBEL * np.log(left), "left over by the function", "residual", "points"),
-            Curve(x, DECIBEL * np.log(scatter), "scatter (1 sigma)", "scatter"),
+            Curve(x, left, "left over by the function", "residual", "points"),
+            Curve(x, scatter, "scatter (1 sigma)", "scatter"),
         ],
     )
 

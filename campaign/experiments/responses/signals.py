@@ -19,13 +19,14 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
+from campaign.estimate import Window
 from campaign.estimation.frequency.multisine import repetition
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.inverse.motion import whole_pieces
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine
-from campaign.trial import Recording, Task
+from campaign.trial import Recording, Task, Trial
 from campaign.units import rate_text, torque_text
 
 SENSORS: Mapping[Side, tuple[str, ...]] = {
@@ -37,7 +38,16 @@ ANGLES = (RELATIVE_ANGLE, MOTOR_ANGLE)
 SHARE_TOLERANCE = 1e-6
 """Largest deviation of a line from a multiple of the base frequency, relative to the line."""
 
+STEADY = "steady"
+"""Window of the samples that are measured: after the transient."""
+
 Excited = Literal["auto", "input", "reference"]
+
+
+def steady_window(trial: Trial) -> Window:
+    """The measured window: `STEADY`, or that of the task for an older trial."""
+    named = (window for window in trial.windows if window.name == STEADY)
+    return next(named, Window(STEADY, *trial.task.window))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.axis_kind import axis_unit
-from campaign.estimate import Window
 from campaign.estimation.frequency.best_linear import BestLinear, best_linear
 from campaign.estimation.frequency.measured_response import MeasuredResponse, closed_from_open
 from campaign.estimation.frequency.multisine import Lines
@@ -31,6 +30,7 @@ from campaign.experiments.responses.signals import (
     repeated,
     signals,
     size_of,
+    steady_window,
     unused,
     whole_stretches,
 )
@@ -39,7 +39,6 @@ from campaign.signals import MultiSine, Sine
 from campaign.text import pretty_unit
 from campaign.units import rate_text, torque_text
 
-STEADY = "steady"
 FEWEST_SINES = 6
 """Fewest frequencies of a response from single sines."""
 GAP = 3.0
@@ -250,10 +249,8 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
 
 
 def _steady(trial: TrialData, time: Array) -> slice:
-    """Samples of the measuring window: the one named `steady`, else the task's."""
-    task = trial.trial.task
-    named = [each for each in trial.trial.windows if each.name == STEADY]
-    window = named[0] if named else Window(STEADY, *task.window)
+    """Samples of the measured window."""
+    window = steady_window(trial.trial)
     half = 0.5 * (time[1] - time[0])
     first, last = np.searchsorted(time, (window.start - half, window.stop - half))
     return slice(int(first), int(last))
@@ -391,15 +388,7 @@ def _of_records(name: str, told: Sequence[Recorded], how: Reading) -> Source:
         raise ValueError("hardly a frequency is coherent: the recording excites nothing")
     numbers = tuple(trial.trial.number for trial, _ in told)
     excitation = f"whatever {len(told)} trials moved by; {first.method}"
-    return Source(
-        name,
-        "records",
-        excitation,
-        numbers,
-        responses,
-        closed,
-        every=HANN_APART,
-    )
+    return Source(name, "records", excitation, numbers, responses, closed, every=HANN_APART)
 
 
 def _what_is_excited(told: Sequence[Recorded], how: Reading) -> Excitation:

@@ -18,12 +18,11 @@ from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.stabilization_error import over_trials
 from campaign.estimation.threshold import Threshold
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key, validated
 from campaign.experiments.sensitivity.model_variation import model_figures, model_trials
 from campaign.experiments.sensitivity.results import (
     SYMBOLS,
     Response,
-    ResponseVerdict,
     judge,
     sensitivity_figure,
     sensitivity_findings,
@@ -42,7 +41,7 @@ from campaign.experiments.shared.pointing_error import (
     windows_of,
 )
 from campaign.physics.bench import Bench
-from campaign.result import Figure, Finding, Result, Value
+from campaign.result import Finding, Result, Value
 from campaign.trial import TrialRequest
 from campaign.units import Angle, in_words
 
@@ -158,7 +157,7 @@ def _analyse(data: TestData) -> Result:
     if not measured:
         return Result()
     notes: list[str] = []
-    options = SensitivityOptions.model_validate(measured[0].trial.options, context={"si": True})
+    options = validated(SensitivityOptions, measured[0].trial.options)
     responses = _responses(measured)
     figures = tuple(model_figures(measured, options.compensation))
     if not responses:
@@ -187,21 +186,17 @@ def _analyse(data: TestData) -> Result:
         notes.append("Thresholds and ranks are not compared: they need every trial.")
     findings.append(Finding.of(unchanged, conditions))
     notes += _skipped_notes(measured, options)
+    name = options.compensation
     return Result(
         (sensitivity_table(judged, limit, seen_through(measured[0].trial)),),
-        (*_figures(judged, limit, conditions, whole), *figures),
+        (
+            *thresholds_figure(judged, limit, name, conditions if whole else None),
+            sensitivity_figure(judged, limit, name),
+            *figures,
+        ),
         tuple(findings),
         tuple(notes),
     )
-
-
-def _figures(
-    judged: Sequence[ResponseVerdict], limit: Threshold, told: Mapping[str, Value], whole: bool
-) -> Iterator[Figure]:
-    """Figures of thresholds, compared with published ones if `whole`, and of all errors."""
-    compensation = str(told["compensation"])
-    yield from thresholds_figure(judged, limit, compensation, told if whole else None)
-    yield sensitivity_figure(judged, limit, compensation)
 
 
 def _skipped_notes(measured: Sequence[TrialData], options: SensitivityOptions) -> Iterator[str]:

@@ -8,6 +8,7 @@ sliding parameters over the rate.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -133,8 +134,9 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
             alt="Model friction torque over rate, for lower, unchanged and higher values of each "
             "static parameter, one panel per parameter.",
             panels=tuple(
-                _panel(name, {**runs[name], 0.0: plain}, _all if name in FAST else _slow)
+                _panel(name, {**runs[name], 0.0: plain}, partial(_over_rate, share=share))
                 for name in static
+                for share in [1.0 if name in FAST else SLOW]
             ),
             thesis=("5.13",),
             across=2,
@@ -164,16 +166,11 @@ def _reversal(data: TrialData) -> tuple[Axis, Any, Any]:
     return axis, cut.time - middle, cut[COMPENSATION_TORQUE]
 
 
-def _all(data: TrialData, share: float = 1.0) -> tuple[Axis, Any, Any]:
-    """Torque over rate, one whole cycle."""
+def _over_rate(data: TrialData, share: float) -> tuple[Axis, Any, Any]:
+    """Torque over rate, one whole cycle, with an axis up to a share of the largest rate."""
     _, cut = _cut(data, CYCLE)
     rate = cut[RELATIVE_RATE]
     largest = share * float(np.max(np.abs(rate), initial=0.0))
     limits = (-largest, largest) if largest > 0 else None
     axis = Axis("Rate", "rad/s", "deg/s", limits=limits)
     return axis, rate, cut[COMPENSATION_TORQUE]
-
-
-def _slow(data: TrialData) -> tuple[Axis, Any, Any]:
-    """Torque over rate, with an axis of slow rates."""
-    return _all(data, SLOW)

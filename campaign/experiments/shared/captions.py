@@ -36,6 +36,11 @@ def _with_unit(text: str, unit: str) -> str:
     return f"{text} {pretty_unit(unit)}".rstrip().replace("-", "−", 1)
 
 
+def duration(seconds: float) -> str:
+    """A short time for a caption: `1.5 ms`, `2 s`."""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+
+
 def surely_above(found: Estimate, level: float, spare: float = 0.0) -> bool:
     """Whether a number exceeds a level by more than `spare`, and its whole interval the level.
 

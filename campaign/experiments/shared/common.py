@@ -6,13 +6,14 @@ import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from campaign.estimate import Estimate
 from campaign.experiments.interface import TestData, TrialData
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
-from campaign.result import Result, Value
+from campaign.result import Array, Result, Value
 from campaign.trial import Tree, canonical_json
 from campaign.units import TORQUE
 
@@ -101,6 +102,25 @@ def joined(results: Iterable[Result]) -> Result:
     )
 
 
+def closed(x: Array, y: Array) -> tuple[Array, Array]:
+    """A cycle, shape (n,), with its first sample again at its end."""
+    return np.append(x, x[0]), np.append(y, y[0])
+
+
+def correlations(names: Sequence[str], matrix: Array) -> dict[tuple[str, str], float]:
+    """Correlation of each pair of names; matrix: shape (k, k)."""
+    return {
+        (one, other): float(matrix[i, j])
+        for i, one in enumerate(names)
+        for j, other in enumerate(names[:i])
+    }
+
+
+def suffixes(count: int) -> list[str]:
+    """Suffixes of the keys of several tables or figures; "" for a single one."""
+    return [f"-{number}" if count > 1 else "" for number in range(1, count + 1)]
+
+
 def of_each_place(
     trials: Iterable[TrialData],
     own: Sequence[str],
@@ -111,8 +131,7 @@ def of_each_place(
     analyse: result of the trials of a point, and the suffix of its keys: "" for a single point.
     """
     groups = grouped(trials, own).values()
-    suffixes = [f"-{number}" if len(groups) > 1 else "" for number in range(1, len(groups) + 1)]
-    return joined(map(analyse, groups, suffixes))
+    return joined(map(analyse, groups, suffixes(len(groups))))
 
 
 def compensation_of(bench: Bench, name: str) -> Any:

@@ -87,8 +87,7 @@ def with_model(bench: Bench, name: str) -> Tree:
                 f"friction.{interface} of the bench '{bench.name}' cannot be described by the "
                 f"model '{name}': see {where}"
             ) from None
-    described: Tree = bench.with_friction(friction).model_dump(mode="json")
-    return described
+    return bench.with_friction(friction).model_dump(mode="json")
 
 
 def _shared(given: Mapping[str, Any], options: type[Options]) -> dict[str, Any]:

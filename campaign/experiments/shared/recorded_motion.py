@@ -1,12 +1,12 @@
-"""Trials of experiments that analyze any recorded motion."""
+"""Trials of experiments that analyze any recorded motion, and trials of a validation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from campaign.experiments.interface import Experiment, Model, Suits, TestData
+from campaign.experiments.interface import Experiment, Model, Suits, TestData, TrialData, validated
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Result
@@ -21,6 +21,16 @@ def nothing_to_plan(options: Options, bench: Bench) -> Iterable[TrialRequest]:
         "trials of this kind are recorded, so there is nothing to plan: add [[test.recording]] and "
         "run `campaign import`"
     )
+
+
+def validation_of(data: TestData, suits: Suits) -> Sequence[TrialData]:
+    """Trials of the validation that suit; none without one. Raises ValueError if none suits."""
+    if not data.validation:
+        return ()
+    chosen, why = suits(data.validation)
+    if why:
+        raise ValueError(f"of the validation {why}")
+    return chosen
 
 
 def of_any_motion(
@@ -43,7 +53,7 @@ def of_any_motion(
         trials, why = suits(tuple(data.completed()))
         if not trials:
             return Result(notes=(f"{why}.",))
-        own = options.model_validate(trials[0].trial.options, context={"si": True})
+        own = validated(options, trials[0].trial.options)
         try:
             result = identify(replace(data, trials=tuple(trials)), own)
         except ValueError as error:

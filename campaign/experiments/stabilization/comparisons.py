@@ -7,8 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from campaign.estimate import Estimate
 from campaign.estimation.stabilization_error import decrease, quotient
 from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.stabilization.errors import COMPENSATION, FOUND, QUANTITY
 from campaign.physics.compensation.identified import stated_name
 from campaign.result import Cell, Column, Finding, Table, Value
+
+Row = Mapping[str, Cell]
+RATIO = "ratio"
+PRELOAD_PATH = "bench.gear.preload.torque"
+"""Swept path of the preload, which the column `average_friction` shows already."""
+_BEHIND = {COMPENSATION: (), "average_friction": (PRELOAD_PATH,)}
 
 
 def preload_of(data: TrialData) -> dict[str, Value]:
@@ -51,30 +58,14 @@ def _only_differ_in(name: str, one: Finding, other: Finding) -> bool:
     return one.conditions.get(name) != other.conditions.get(name) and rest(one) == rest(other)
 
 
-_BEHIND = {"compensation": (), "average_friction": ("bench.gear.preload.torque",)}
-
-
 def _lowest(finding: Finding, errors: Sequence[Finding]) -> bool:
     here = finding.conditions["average_friction"]
     preloads = [e.conditions.get("average_friction") for e in errors]
     return here == min(v for v in preloads if isinstance(v, int | float))
 
 
-Row = Mapping[str, Cell]
-RATIO = "ratio"
-ERROR = "stabilization_error"
-OWN = ("compensation", "error", "peak", "stuck", "repeats", "spread", "next")
-"""Entries of a row of errors that are no conditions."""
-PRELOAD_PATH = "bench.gear.preload.torque"
-"""Swept path of the preload, which the column `average_friction` shows already."""
-
-
-def beside_rows(rows: Sequence[Row]) -> tuple[Row, ...]:
+def beside_rows(rows: Sequence[Row]) -> Iterator[Row]:
     """One row for each identified compensation whose stated one has an error there, too."""
-    return tuple(_pairs(rows))
-
-
-def _pairs(rows: Sequence[Row]) -> Iterator[Row]:
     for row in rows:
         stated = stated_name(str(row["compensation"]))
         other = next((o for o in rows if o["compensation"] == stated and _at(o) == _at(row)), None)
@@ -93,7 +84,7 @@ def _pairs(rows: Sequence[Row]) -> Iterator[Row]:
 
 
 def _at(row: Row) -> dict[str, Cell]:
-    return {name: value for name, value in row.items() if name not in OWN}
+    return {name: cell for name, cell in row.items() if name not in FOUND | {COMPENSATION}}
 
 
 def beside_table(rows: Sequence[Row], extra: Sequence[str]) -> Table:
@@ -105,7 +96,7 @@ def beside_table(rows: Sequence[Row], extra: Sequence[str]) -> Table:
         columns.append(Column("average_friction", "Preload", "N m", "N m", exact=True))
     columns += [Column(p, p, exact=True) for p in extra if p != PRELOAD_PATH]
     columns += [
-        Column("stated", "Error (1σ), as stated", "rad", "mrad", quantity=ERROR),
+        Column("stated", "Error (1σ), as stated", "rad", "mrad", quantity=QUANTITY),
         Column("identified", "Error (1σ), as identified", "rad", "mrad"),
         Column(RATIO, "Identified over stated"),
     ]

@@ -200,7 +200,7 @@ def _analyse(data: TestData) -> Result:
     figures = list(stabilization_figures(firsts, paths, rows, StabilizationOptions))
     extra = [path for path in paths if path not in columns]
     tables = [_table(rows, extra, seen_through(firsts[0].trial) if firsts else "")]
-    beside = beside_rows(rows)
+    beside = tuple(beside_rows(rows))
     if beside:
         tables.insert(0, beside_table(beside, extra))  # first, as the purpose of such a test
     return Result(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from campaign.channels import BASE_RATE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE, missing
 from campaign.estimation.relative_rate import RelativeRate, relative_rate
+from campaign.experiments.shared.captions import duration
 from campaign.experiments.shared.common import method_label
 from campaign.experiments.shared.pointing_error import rate_of
 from campaign.recording import Recording
@@ -68,7 +69,7 @@ class Slow:
 
     @property
     def words(self) -> str:
-        return f"{'over ' if self.cut else ''}{_time(self.stop - self.start)}"
+        return f"{'over ' if self.cut else ''}{duration(self.stop - self.start)}"
 
 
 @dataclass(frozen=True)
@@ -226,10 +227,6 @@ def _away_panel(shown: Mapping[str, MethodRate], zoom: Zoom) -> Iterator[Panel]:
         yield Panel(time, AWAY, curves, "All, less a load held still")
 
 
-def _time(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
-
-
 def _filter_words(whole: RelativeRate, shown: Sequence[MethodRate]) -> Iterator[str]:
     """Caption sentences on the filters of the rates; nothing on unfiltered rates."""
     zooms = list(dict.fromkeys(_how(each.rate) for each in shown))
@@ -244,7 +241,7 @@ def _filter_words(whole: RelativeRate, shown: Sequence[MethodRate]) -> Iterator[
 
 def _how(rate: RelativeRate) -> str:
     if rate.sensor == "gyro":
-        averaged = f", averaged over {_time(rate.window)}" if rate.window else ""
+        averaged = f", averaged over {duration(rate.window)}" if rate.window else ""
         return (
             f"the difference of the rates of load and hull in space{averaged}, because counts of "
             "the encoder are too coarse"
@@ -252,7 +249,7 @@ def _how(rate: RelativeRate) -> str:
     if not rate.window:
         return ""
     return (
-        f"the slope of a line through {_time(rate.window)} of the encoder's samples, a filter "
+        f"the slope of a line through {duration(rate.window)} of the encoder's samples, a filter "
         f"without delay that resolves {rate_text(rate.finest, '.2g')}"
     )
 
@@ -280,6 +277,6 @@ def _blind_words(first: Recording, shown: Sequence[MethodRate], zoom: Zoom) -> s
         return ""
     time = (int(np.argmax(after)) + int(np.argmax(before))) / rate_of(first)
     return (
-        f"For {_time(time)} around the reversal the hull moves by less than one count of the "
+        f"For {duration(time)} around the reversal the hull moves by less than one count of the "
         f"encoder ({angle_text(count, '.2g')}). Whether the load sticks then cannot be seen."
     )

@@ -14,8 +14,6 @@ from pydantic import Field
 
 from campaign.estimate import Origin
 from campaign.estimation.gate import admitted
-from campaign.estimation.inverse.terms import Term
-from campaign.experiments.any_motion.inverse_fit import InverseDynamics
 from campaign.experiments.any_motion.inverse_fit import find as find_inverse
 from campaign.experiments.any_motion.motions import (
     MotionPiece,
@@ -82,7 +80,8 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
         moves = replace(moves, skip=0)
     filtering = replace(moves, slowest=STILL * moves.slowest)
     regression = find_inverse(pieces, unseen, moves, linear=data.bench.is_linear)
-    extra = _linear_terms(regression)
+    terms = regression.best.structure.terms
+    extra = tuple(term for term in terms if term.name.startswith(LINEAR))
     held = regression.instruments
     known = held.delay if held is not None and held.of_wanted else None
     found = find(
@@ -116,11 +115,6 @@ def _left_out(whole: Sequence[MotionPiece], parts: Sequence[MotionPiece]) -> tup
         for side in (parts, whole)
     )
     return (PARTS(used=used, recorded=recorded, parts=len(parts)),)
-
-
-def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:
-    terms = found.best.structure.terms
-    return tuple(term for term in terms if term.name.startswith(LINEAR))
 
 
 def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:

@@ -11,7 +11,6 @@ from campaign.estimation.inverse.motion import Motion
 from campaign.estimation.inverse.rows import moving, rows
 from campaign.estimation.inverse.terms import Term
 from campaign.estimation.inverse.terms import columns as columns_of
-from campaign.estimation.inverse.validation import Prediction
 from campaign.experiments.any_motion.figures import FORCE, LEFT, PLACE, RATE, TIME, with_gaps
 from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics, together
 from campaign.experiments.any_motion.motions import MotionPiece, place_and_rate
@@ -73,7 +72,7 @@ def values_table(fit: Fit) -> Table:
 
 
 def figures(
-    found: Whole, plain: InverseDynamics | None, unseen: Sequence[MotionPiece]
+    found: Whole, plain: InverseDynamics, unseen: Sequence[MotionPiece]
 ) -> Iterator[Figure]:
     """Figures of friction over rate, and of validation residuals."""
     yield _curve_figure(found, plain)
@@ -81,19 +80,18 @@ def figures(
         yield _left_figure(found, plain, unseen)
 
 
-def _curve_figure(found: Whole, plain: InverseDynamics | None) -> Figure:
+def _curve_figure(found: Whole, plain: InverseDynamics) -> Figure:
     """Measured force less inertia and linear terms, with each model's steady friction."""
     best = found.fits[found.best]
     rate, rest = _measured(found, best)
     top = float(np.abs(rate).max())
     near = top * np.geomspace(1e-3, 1.0, FINE)
     sweep = np.concatenate([-near[::-1], [np.nan], near])
-    curves = [Curve(rate, rest, "rows", "measured", "points")]
-    if plain is not None:
-        curves.append(Curve(sweep, _regressed(_plainest(plain), sweep), PLAIN, PLAIN))
     drawn = _drawn(found, MOST_DRAWN)
-    curves += [
-        Curve(sweep, _steady(each, sweep), each.model.name, each.model.name) for each in drawn
+    curves = [
+        Curve(rate, rest, "rows", "measured", "points"),
+        Curve(sweep, _regressed(_plainest(plain), sweep), PLAIN, PLAIN),
+        *(Curve(sweep, _steady(each, sweep), each.model.name, each.model.name) for each in drawn),
     ]
     left_out = len(found.fits) - len(drawn)
     which = f" Without the {left_out} models that predict omitted blocks worst." if left_out else ""
@@ -152,20 +150,14 @@ def _regressed(fitted: CandidateFit, rate: Array) -> Array:
     return columns_of(steady, fitted.structure.terms) @ fitted.structure.fit.values
 
 
-def _left_figure(
-    found: Whole, plain: InverseDynamics | None, unseen: Sequence[MotionPiece]
-) -> Figure:
+def _left_figure(found: Whole, plain: InverseDynamics, unseen: Sequence[MotionPiece]) -> Figure:
     """Validation residuals of up to four models over time, rate and angle."""
-    shown: list[tuple[str, Prediction]] = []
-    if plain is not None:
-        reference = _plainest(plain)
-        if reference.predictions:
-            shown.append((PLAIN, together(reference.predictions)))
-    fits = _drawn(found, MOST_LEFT_OVER - len(shown))
-    shown += [(each.model.name, together(each.predictions)) for each in fits]
+    every = [(PLAIN, _plainest(plain).predictions)]
+    every += [(each.model.name, each.predictions) for each in _drawn(found, MOST_LEFT_OVER - 1)]
     place = place_and_rate(unseen, found.filtering)
     panels = []
-    for name, prediction in shown:
+    for name, predictions in every:
+        prediction = together(predictions)
         left = prediction.residuals
         title = f"{name}: {100 * prediction.relative:.2f} %"
         panels += [

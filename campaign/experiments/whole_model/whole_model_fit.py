@@ -25,7 +25,7 @@ from campaign.estimation.whole_model import (
 )
 from campaign.experiments.any_motion.inverse_fit import together
 from campaign.experiments.any_motion.motions import MotionPiece, never_moved
-from campaign.experiments.interface import say_at
+from campaign.experiments.interface import no_progress, say_at
 from campaign.experiments.whole_model.doubts import (
     HALF_BAND,
     OTHER_EXPONENT,
@@ -143,7 +143,7 @@ def find(
     filtering: FilterSettings,
     extra: Sequence[Term] = (),
     starts: int = 3,
-    say: Callable[[str], None] = lambda text: None,
+    say: Callable[[str], None] = no_progress,
     *,
     known: Estimate | None = None,
     names: Sequence[str] = USUAL,

@@ -44,10 +44,11 @@ from campaign.experiments.frequency_response.model.validation_figures import (
     validation_figures,
     validation_tables,
 )
-from campaign.experiments.interface import Model, TestData, TrialData
+from campaign.experiments.interface import Model, TestData
 from campaign.experiments.responses.signals import Excited, usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_tables, sources_table
+from campaign.experiments.shared.recorded_motion import validation_of
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, known_uncertainty
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen
@@ -122,17 +123,13 @@ def identified(data: TestData) -> Result:
     torque = known_uncertainty(data.bench, TORQUE_CONSTANT)
     two_masses = masses(best, data.bench, options.place, band, torque, fitted)
     parameters = tuple(_parameters(two_masses, best or fitted[0]))
+    correlations = _correlations(two_masses, parameters)
     fits = tuple(models(fitted, two_masses, band))
-    unseen: Sequence[TrialData] = ()
-    if data.validation:
-        unseen, why = usable(data.validation)
-        if why:
-            raise ValueError(f"of the validation {why}")
-    validation = validated(data.trials, unseen, data.bench, how, fits)
+    validation = validated(data.trials, validation_of(data, usable), data.bench, how, fits)
     tables = (
         sources_table([each.source for each in fitted]),
-        masses_table(two_masses),
-        correlations_table(two_masses, _told_names(parameters)),
+        *masses_table(two_masses),
+        correlations_table(correlations),
         modes_table(fitted),
         *loop_tables(fitted),
         *distortion_tables([each.source for each in fitted]),
@@ -140,7 +137,7 @@ def identified(data: TestData) -> Result:
         *validation_tables(validation),
     )
     return Result(
-        tables=tuple(each for each in tables if each is not None and each.rows),
+        tables=tuple(each for each in tables if each.rows),
         figures=(
             *validation_figures(validation),
             *figures(fitted, two_masses),
@@ -152,11 +149,7 @@ def identified(data: TestData) -> Result:
             *_notes(fitted, two_masses, remarks),
             *(f"Of the validation: {each}" for each in validation.remarks),
         ),
-        identified=IdentifiedRig(
-            parameters,
-            correlations=_correlations(two_masses, parameters),
-            unseen=_unseen(validation),
-        ),
+        identified=IdentifiedRig(parameters, correlations=correlations, unseen=_unseen(validation)),
     )
 
 
@@ -170,12 +163,8 @@ def _correlations(told: Masses, parameters: Sequence[Parameter]) -> Mapping[tupl
     """Correlations by scatter, of the numbers with an interval."""
     if told.drive is None:
         return {}
-    names = _told_names(parameters)
+    names = {each.estimate.name for each in parameters if each.estimate.has_interval}
     return {pair: share for pair, share in told.drive.correlations.items() if {*pair} <= names}
-
-
-def _told_names(parameters: Sequence[Parameter]) -> set[str]:
-    return {each.estimate.name for each in parameters if each.estimate.has_interval}
 
 
 def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:

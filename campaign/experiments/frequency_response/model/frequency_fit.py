@@ -12,6 +12,7 @@ from campaign.estimation.elastic_mode import ElasticMode, elastic_mode
 from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.frequency.extrema import extrema, relative_scatter
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import Mode, chosen_modes
 from campaign.estimation.frequency.orders import ChosenOrder, chosen_order
 from campaign.estimation.frequency.two_mass import two_mass
@@ -107,8 +108,14 @@ class Masses:
         return self.axis is not self.drive
 
 
+def _parts(source: Source, band: Band) -> dict[Side, MeasuredResponse]:
+    """Points of a source for a fit in a band, by side."""
+    return {side: fitted_part(source, side, band.lowest, band.highest) for side in source.responses}
+
+
 def found_in(source: Source, band: Band) -> FrequencyFit:
     """Fits, modes and margins of one source."""
+    parts = _parts(source, band)
     fits: dict[Side, ChosenOrder] = {}
     remarks: list[str] = []
     modes: dict[Side, tuple[Mode, ...]] = {}
@@ -119,30 +126,21 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
         )
         modes = {side: _extrema(source, side, band) for side in source.best}
     else:
-        for side in source.responses:
-            part = fitted_part(source, side, band.lowest, band.highest)
+        for side, part in parts.items():
             try:
                 fits[side] = chosen_order(part, band.order)
             except ValueError as error:
                 remarks.append(f"{source.name}, {side}: {error}.")
     modes |= {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
     for side in modes:
-        if why := _held_by_spring(source, side, band):
+        if why := held_by_spring(parts[side].response):
             modes[side] = tuple(_refused(mode, why) for mode in modes[side])
     local: dict[Side, ElasticMode] = {}
-    for side in source.responses:
-        if side in modes:
-            continue
-        part = fitted_part(source, side, band.lowest, band.highest)
-        mode = elastic_mode(part.response)
-        if mode is not None:
+    for side, part in parts.items():
+        if side not in modes and (mode := elastic_mode(part.response)) is not None:
             local[side] = mode
     margins = None if source.closed is None or few else characteristics(source.closed)
     return FrequencyFit(source, fits, modes, local, margins, tuple(remarks))
-
-
-def _held_by_spring(source: Source, side: Side, band: Band) -> Reason:
-    return held_by_spring(fitted_part(source, side, band.lowest, band.highest).response)
 
 
 def _refused(mode: Mode, why: Reason) -> Mode:
@@ -205,8 +203,8 @@ def masses(
     if found is None:
         return Masses(None, None, NOTHING_FITTED())
     source = found.source
-    for side in source.responses:
-        if why := _held_by_spring(source, side, band):
+    for part in _parts(source, band).values():
+        if why := held_by_spring(part.response):
             return Masses(None, source, why)
     first = min(float(each.frequency[0]) for each in source.responses.values())
     try:
@@ -215,30 +213,19 @@ def masses(
             if result.drive is None or not result.drive.misfit:
                 break
             higher = replace(band, lowest=factor * first)
-            other = _narrower(source, bench, place, higher, torque)
-            if other is not None and other.drive is not None and not other.drive.misfit:
-                result, band = replace(other, lowest=higher.lowest), higher
+            with suppress(ValueError):  # too little of the band is left
+                other = _placed(source, bench, place, higher, torque)
+                if other.drive is not None and not other.drive.misfit:
+                    result, band = replace(other, lowest=higher.lowest), higher
         if result.drive is None or result.drive.misfit:
             return replace(result, axis=result.drive)
         return _with_axis(result, source, [each.source for each in others], band)
-    except (ValueError, np.linalg.LinAlgError) as error:
+    except ValueError as error:
         return Masses(None, source, NO_FIT(error=str(error)))
 
 
-def _narrower(
-    source: Source, bench: Bench, place: str, band: Band, torque: float | None
-) -> Masses | None:
-    """Masses in a narrower band; None if too little of it is left."""
-    try:
-        return _placed(source, bench, place, band, torque)
-    except ValueError:
-        return None
-
-
 def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float | None) -> Masses:
-    parts = {
-        side: fitted_part(source, side, band.lowest, band.highest) for side in source.responses
-    }
+    parts = _parts(source, band)
     if "motor" in parts:
         places: dict[Side, Side] = {side: side for side in parts}
         return Masses(two_mass(parts, torque_uncertainty=torque), source, places=places)
@@ -295,10 +282,8 @@ def _weaker_drive(told: Masses, other: Source, band: Band) -> TwoMass:
     first = min(float(each.frequency[0]) for each in other.responses.values())
     tried = []
     for lowest in {band.lowest, *(max(factor * first, band.lowest) for factor in NARROWER)}:
-        parts = {
-            told.places[side]: fitted_part(other, side, lowest, band.highest)
-            for side in other.responses
-        }
+        found = _parts(other, replace(band, lowest=lowest))
+        parts = {told.places[side]: part for side, part in found.items()}
         with suppress(ValueError):  # too little of the band is left
             tried.append(two_mass(parts, rigid=told.drive is not None and told.drive.rigid))
     if not tried:

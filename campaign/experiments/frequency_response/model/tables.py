@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -82,8 +82,8 @@ def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
     )
 
 
-def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
-    """Resonances and antiresonances."""
+def modes_table(found: Sequence[FrequencyFit]) -> Table:
+    """Resonances and antiresonances; no rows without any."""
     entries: list[tuple[str, str, str, Estimate, Estimate | None]] = []
     for each in found:
         for side, modes in each.modes.items():
@@ -96,8 +96,6 @@ def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
             own, kind = (each.source.name, side), f"resonance, {smooth}"
             entries.append((*own, kind, one.frequency, one.damping_ratio))
             entries.append((*own, f"anti{kind}", one.antiresonance, None))
-    if not entries:
-        return None
     names = ("source", "side", "kind", "frequency", "damping")
     return Table(
         "modes",
@@ -124,14 +122,14 @@ def loop_tables(found: Sequence[FrequencyFit]) -> Iterator[Table]:
         yield from margin_tables(loops, (NAME,))
 
 
-def masses_table(masses: Masses) -> Table | None:
+def masses_table(masses: Masses) -> Iterator[Table]:
     """Drive of the response, and of the axis if friction makes it different.
 
-    None if it is no model of the response, and for one inertia without friction's part.
+    Nothing if it is no model of the response, and for one inertia without friction's part.
     """
     drive, axis = masses.drive, masses.axis
     if drive is None or axis is None or drive.misfit or (drive.rigid and not masses.is_bent):
-        return None
+        return
     columns: tuple[Column, ...] = (
         Column("motor_inertia", "Driven inertia", "kg m^2", "kg m^2"),
         Column("load_inertia", "Inertia behind the spring", "kg m^2", "kg m^2"),
@@ -157,7 +155,7 @@ def masses_table(masses: Masses) -> Table | None:
             " Of the response: at this excitation, by scatter alone. Of the axis: with the "
             "effect of friction, by other excitations or the odd distortion."
         )
-    return Table(
+    yield Table(
         "one-inertia" if drive.rigid else "two-masses",
         "One inertia" if drive.rigid else "Two inertias on a spring",
         (*columns, Column("of", "Of", exact=True)),
@@ -174,18 +172,9 @@ def drive_name(drive: TwoMass) -> str:
     return "one inertia" if drive.rigid else "two inertias"
 
 
-def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
-    """Correlations of the two-mass numbers with these names, the largest first."""
-    if masses.drive is None:
-        return None
-    pairs = [
-        (one, other, share)
-        for (one, other), share in masses.drive.correlations.items()
-        if {one, other} <= {*names}
-    ]
-    pairs.sort(key=lambda each: -abs(each[2]))
-    if not pairs:
-        return None
+def correlations_table(correlations: Mapping[tuple[str, str], float]) -> Table:
+    """Correlations of the two-mass numbers, the largest first; no rows without any."""
+    falling = sorted(correlations.items(), key=lambda each: -abs(each[1]))
     return Table(
         "correlations",
         "Correlation of the numbers of the two inertias",
@@ -196,7 +185,7 @@ def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
         ),
         tuple(
             {"one": words(one), "other": words(other), "share": share}
-            for one, other, share in pairs
+            for (one, other), share in falling
         ),
         note="By scatter alone: what a wrong torque constant or friction does, moves them as well.",
     )

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
+from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.output_error import (
     Simulated,
@@ -17,6 +19,7 @@ from campaign.estimation.frequency.output_error import (
     simulated_output,
 )
 from campaign.estimation.frequency.prediction import HeldAgainst, held_against
+from campaign.estimation.frequency.rational import RationalFit
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.experiments.frequency_response.model.frequency_fit import Band, FrequencyFit, Masses
 from campaign.experiments.frequency_response.model.tables import drive_name
@@ -64,6 +67,11 @@ class Model:
     poles: ComplexArray
     misfit: Reason
 
+    @property
+    def band(self) -> tuple[float, float]:
+        """Ends of the fitted band (Hz), widened by rounding: both ends are lines."""
+        return self.lowest / (1.0 + 1e-9), self.highest * (1.0 + 1e-9)
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -102,36 +110,29 @@ def models(found: Sequence[FrequencyFit], told: Masses, band: Band) -> Iterator[
     for each in found:
         for side, chosen in each.fits.items():
             fit = chosen.fit
-
-            def slope(frequency: Array, fit=fit) -> ComplexArray:  # type: ignore[no-untyped-def]
-                return np.asarray(fit.value(frequency)[:, None] * fit.log_jacobian(frequency))
-
             yield Model(
-                FUNCTION, each.source, side, fit.lowest, fit.highest, fit.value, slope,
-                fit.scatter, fit.poles, fit.misfit,
+                FUNCTION, each.source, side, fit.lowest, fit.highest, fit.value,
+                partial(_slope, fit), fit.scatter, fit.poles, fit.misfit,
             )  # fmt: skip
         if told.drive is not None and told.source is each.source:
-            yield from _masses(told, each.source, band)
+            yield from _masses(told, told.drive, each.source, band)
 
 
-def _masses(told: Masses, source: Source, band: Band) -> Iterator[Model]:
-    drive = told.drive
+def _slope(fit: RationalFit, frequency: Array) -> ComplexArray:
+    """Derivative of a fitted function by its parameters, shape (n, p)."""
+    return np.asarray(fit.value(frequency)[:, None] * fit.log_jacobian(frequency))
+
+
+def _masses(told: Masses, drive: TwoMass, source: Source, band: Band) -> Iterator[Model]:
+    if drive.misfit and not drive.covariance.size:
+        return
     for side, place in told.places.items():
-        if drive is None or (drive.misfit and not drive.covariance.size):
-            continue
-        lowest = max(band.lowest, told.lowest)
-        part = fitted_part(source, side, lowest, band.highest)
-
-        def value(frequency: Array, drive=drive, place=place) -> ComplexArray:  # type: ignore[no-untyped-def]
-            return np.asarray(drive.value(frequency, place))
-
-        def slope(frequency: Array, drive=drive, place=place) -> ComplexArray:  # type: ignore[no-untyped-def]
-            return np.asarray(drive.jacobian(frequency, place))
-
+        part = fitted_part(source, side, max(band.lowest, told.lowest), band.highest)
         ends = float(part.frequency[0]), float(part.frequency[-1])
         poles = np.polynomial.polynomial.polyroots(drive.polynomials(place)[1])
         yield Model(
-            drive_name(drive), source, side, *ends, value, slope, drive.covariance,
+            drive_name(drive), source, side, *ends, partial(drive.value, side=place),
+            partial(drive.jacobian, side=place), drive.covariance,
             np.asarray(poles, dtype=complex), drive.misfit,
         )  # fmt: skip
 
@@ -220,9 +221,7 @@ def _predicted(
     bench: Bench,
     how: Reading,
 ) -> Prediction | None:
-    slack = 1.0 + 1e-9
-    part = measured.between(model.lowest / slack, model.highest * slack)
-    part = part.at(slice(None, None, source.every))
+    part = measured.between(*model.band).at(slice(None, None, source.every))
     if len(part.frequency) < FEWEST_LINES:
         return None
     at = part.frequency

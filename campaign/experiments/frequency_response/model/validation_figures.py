@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from campaign.estimation.frequency.measured_response import MeasuredResponse
+from campaign.estimation.frequency.output_error import Simulated
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit
+from campaign.experiments.frequency_response.model.tables import FINE
 from campaign.experiments.frequency_response.model.validation import (
     Model,
     Prediction,
@@ -21,8 +22,6 @@ from campaign.experiments.responses.tables import NAME, SENSOR
 from campaign.reason import Cause
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Table
 
-FINE = 800
-"""Frequencies at which a model is drawn."""
 TIME = Axis("Time", "s", "s")
 SELDOM = math.sqrt(-math.log(0.05))
 """Complex error over its root mean square that chance exceeds once in twenty."""
@@ -161,7 +160,7 @@ def validation_figures(validation: Validation) -> Iterator[Figure]:
         sides.setdefault((each.source.name, each.model.side), []).append(each)
     for number, ((name, side), some) in enumerate(sides.items(), start=1):
         yield _response(f"prediction-{number}-{side}", name, side, some)
-        simulated = [each for each in some if each.first is not None]
+        simulated = [(each, each.first) for each in some if each.first is not None]
         if simulated:
             yield _over_time(f"output-{number}-{side}", name, side, simulated)
 
@@ -197,21 +196,17 @@ def _response(key: str, name: str, side: str, some: Sequence[Prediction]) -> Fig
     )
 
 
-def _over_time(key: str, name: str, side: str, some: Sequence[Prediction]) -> Figure:
-    first = some[0].first
-    if first is None:
-        raise ValueError("there is no simulated output to draw")
+def _over_time(
+    key: str, name: str, side: str, some: Sequence[tuple[Prediction, Simulated]]
+) -> Figure:
+    shown, first = some[0]
     curves = [Curve(first.time, first.measured, "measured", "measured")]
-    what, units = ("Angle", ("rad", "mrad")) if some[0].is_angle else ("Rate", ("rad/s", "deg/s"))
+    what, units = ("Angle", ("rad", "mrad")) if shown.is_angle else ("Rate", ("rad/s", "deg/s"))
     left = []
-    for each in some:
-        if each.first is None:
-            continue
-        curves.append(
-            Curve(each.first.time, each.first.simulated, each.model.name, each.model.name, "thin")
-        )
-        rest = each.first.measured - each.first.simulated
-        left.append(Curve(each.first.time, rest, each.model.name, each.model.name, "thin"))
+    for prediction, run in some:
+        model = prediction.model.name
+        curves.append(Curve(run.time, run.simulated, model, model, "thin"))
+        left.append(Curve(run.time, run.measured - run.simulated, model, model, "thin"))
     return Figure(
         key,
         f"Unseen output over time, {name}, sensor of the {side}",
@@ -273,11 +268,6 @@ def _residuals(key: str, each: FrequencyFit, side: str, own: Sequence[Model]) ->
 
 def weighted(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (Hz) and complex residuals over the deviation of either part, each shape (n,)."""
-    part = _fitted(model)
+    part = fitted_part(model.source, model.side, *model.band)
     size = np.maximum(np.sqrt(0.5 * (part.variance + part.bias**2)), 1e-300)
     return part.frequency, (part.values - model.value(part.frequency)) / size
-
-
-def _fitted(model: Model) -> MeasuredResponse:
-    slack = 1.0 + 1e-9
-    return fitted_part(model.source, model.side, model.lowest / slack, model.highest * slack)
