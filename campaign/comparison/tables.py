@@ -15,14 +15,13 @@ from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.run_comparison import Against, size_of
 from campaign.estimate import Estimate
 from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.reason import Reason
 from campaign.references.verdict import Verdict
 from campaign.result import Cell, Column, Finding, Table
 from campaign.text import interval, pretty_unit
 
 
-def pair_table(
-    key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str], note: str = ""
-) -> Table:
+def pair_table(key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str]) -> Table:
     """Table with one row per pair, each in its own unit."""
     reference, other = letters
     return Table(
@@ -43,7 +42,6 @@ def pair_table(
             Column("reason", "Why not judged"),
         ),
         tuple(_row(pair) for pair in pairs),
-        note=note,
     )
 
 
@@ -101,10 +99,13 @@ def changes_table(changes: Sequence[Change], letters: tuple[str, str]) -> Table:
 
 
 def not_judged(pairs: Iterable[Pair]) -> Iterator[str]:
-    """Reasons for no verdict with their counts, as `12: ...`, the most frequent first."""
-    counts = Counter(str(pair.reason) for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
-    for reason, count in counts.most_common():
-        yield f"{count}: {reason}"
+    """Reasons for no verdict with their counts (`counted`)."""
+    return counted(pair.reason for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
+
+
+def counted(reasons: Iterable[Reason]) -> Iterator[str]:
+    """Reasons with their counts, as `12: ...`, the most frequent first."""
+    return (f"{count}: {text}" for text, count in Counter(map(str, reasons)).most_common())
 
 
 def name_of(pair: Pair) -> str:
