@@ -14,7 +14,7 @@ from campaign.text import pretty_unit
 from campaign.trends.members import Member
 from campaign.trends.series import Series
 from campaign.trial import Outcome, Role
-from campaign.units import split_quantity
+from campaign.units import factor, split_quantity
 
 TIME, ORDER = "time", "order"
 DAY = 86_400.0
@@ -147,8 +147,6 @@ def _tagged(member: Member, name: str) -> tuple[float, str] | None:
 
 
 def _tag(name: str, members: Sequence[Member]) -> Covariate:
-    from campaign.units import factor
-
     tags = {m.number: tag for m in members if (tag := _tagged(m, name)) is not None}
     unit = next(iter(tags.values()))[1]
     values: dict[int, float] = {}

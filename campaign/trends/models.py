@@ -9,8 +9,9 @@ from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment, bench_of
 from campaign.identify.identification import Section, fitted_again, identify
 from campaign.identify.material import ChosenRun
+from campaign.parameter import Parameter
 from campaign.trends.members import Member
-from campaign.trends.series import TWIN, Point, Series, add_point, made
+from campaign.trends.series import TWIN, Collected, Series
 from campaign.trial import Outcome, Role
 
 
@@ -39,7 +40,7 @@ def fit_models(
 
 def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: str) -> TrendFit:
     first: Section | None = None
-    fits: dict[str, tuple[Section, list[Point], list[str]]] = {}
+    fits: dict[str, tuple[Parameter, Collected]] = {}
     problems: list[str] = []
     seen: dict[tuple[str, ...], Member] = {}
     for member in members:
@@ -49,27 +50,25 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
             continue
         if first is None:
             first = section
-            fits = {p.estimate.name: (section, [], []) for p in section.identified.parameters}
+            fits = {
+                each.estimate.name: (each, Collected(each.estimate.unit))
+                for each in section.identified.parameters
+            }
         prints = tuple(text for own in member.identical.values() for text in own)
         twin = seen.setdefault(prints, member) if prints else member
         same = "" if twin is member else f"{TWIN} {twin.name}"
         for parameter in section.identified.parameters:
             if parameter.estimate.name in fits:
-                _, points, left_out = fits[parameter.estimate.name]
-                estimate = parameter.estimate
-                add_point(points, left_out, member, "", estimate, _unit(fits, estimate.name), same)
+                fits[parameter.estimate.name][1].add(member, "", parameter.estimate, same)
     series = tuple(
-        made(
-            points,
-            left_out,
+        collected.series(
             test=name,
             title=known[name].model.summary,
             quantity=each,
             name=each.replace("_", " "),
-            unit=_unit(fits, each),
-            display=_display(section, each),
+            display=parameter.display or parameter.estimate.unit,
         )
-        for each, (section, points, left_out) in fits.items()
+        for each, (parameter, collected) in fits.items()
     )
     return TrendFit(name, series, tuple(problems))
 
@@ -94,13 +93,3 @@ def _section(
     except UsageError as error:
         return str(error), None
     return section.problem, section
-
-
-def _unit(found: Mapping[str, tuple[Section, list[Point], list[str]]], name: str) -> str:
-    parameters = found[name][0].identified.parameters
-    return next(p.estimate.unit for p in parameters if p.estimate.name == name)
-
-
-def _display(section: Section, name: str) -> str:
-    own = next(p for p in section.identified.parameters if p.estimate.name == name)
-    return own.display or own.estimate.unit

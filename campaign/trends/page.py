@@ -131,7 +131,7 @@ def _numbers(trends: Trends, folder: Folder) -> Iterator[Piece]:
     if why := tuple(not_judged(trends)):
         yield Paragraph("Not judged, and why:")
         yield Items(why)
-    every = followed_table("followed", "All numbers", trends.followed, trends.covariate)
+    every = followed_table(trends.followed, trends.covariate)
     files = (
         (
             "All numbers with all p values, scatter and notes:",
@@ -239,13 +239,12 @@ def _tree(each: TrendSeries, trends: Trends) -> dict[str, Any]:
     effects = effect(each, trends.covariate)
     if effects is None or each.change is None:
         return tree
-    adjusted = dict(each.adjusted or {})
     return tree | {
         "mean": row_of(each.mean),
         "trend": row_of(effects[0]),
         "trend_share": row_of(effects[1]),
         "p": each.p,
-        "adjusted": adjusted,
+        "adjusted": dict(each.adjusted or {}),
         "shape": each.change.shape,
         "detectable": {
             name: detectable(each, name, trends.covariate) for name in each.detectable or {}

@@ -11,6 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,17 +51,6 @@ class Point:
     member: Member
     test: str
     estimate: Estimate
-
-
-@dataclass
-class _Collected:
-    """A finding of the reference run with the points of all runs."""
-
-    test: AnalysedTest
-    finding: Finding
-    points: list[Point] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
-    wrong: list[Reason] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -137,84 +127,77 @@ def series_of(members: Sequence[Member]) -> list[Series]:
         members, key=lambda m: (sum(len(t.result.findings) for t in m.tests), -m.number)
     )
     collected = {
-        (i, k): _Collected(test, finding)
-        for i, test in enumerate(reference.tests)
-        for k, finding in enumerate(test.result.findings)
+        id(finding): (test, finding, Collected(finding.unit))
+        for test in reference.tests
+        for finding in test.result.findings
         if not finding.recomputed
     }
-    places = {id(each.finding): each for each in collected.values()}
     seen: dict[tuple[str, tuple[str, ...]], Member] = {}
     for member in members:
         for pair in pair_tests(reference.tests, member.tests).tests:
             twin = _twin(seen, member, pair.other.name, pair.reference.name)
             for one, other in pair.findings:
-                entry = places[id(one)]
                 why = f"{TWIN} {twin.name}" if twin else ""
-                test, number = pair.other.name, other.known
-                add_point(entry.points, entry.left_out, member, test, number, one.unit, why)
-                if number.origin is Origin.CONTRADICTED:
-                    entry.wrong.append(number.reason)
-    return [_series(each) for each in collected.values()]
+                collected[id(one)][2].add(member, pair.other.name, other.known, why)
+    return [_series(*each) for each in collected.values()]
 
 
-def add_point(
-    points: list[Point],
-    left_out: list[str],
-    member: Member,
-    test: str,
-    estimate: Estimate,
-    unit: str,
-    why: str = "",
-) -> None:
-    """Append a point, or its reason to `left_out`: no finite value, a bound, given, or `why`."""
-    estimate = in_unit(estimate, unit)
-    if not why and not math.isfinite(estimate.value):
-        why = "not found"
-    if not why and estimate.kind in BOUNDS:
-        why = "a bound"
-    if not why and estimate.origin is Origin.GIVEN:
-        why = "given, not measured"
-    if why:
-        left_out.append(f"{member.name}: {why}")
-    else:
-        points.append(Point(member, test, estimate))
+@dataclass
+class Collected:
+    """Points of one number, collected run by run.
+
+    Attributes:
+        unit: of all points (SI).
+        left_out: runs without a point, with the reason.
+        wrong: reasons of the numbers whose model the data contradict.
+    """
+
+    unit: str
+    points: list[Point] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    wrong: list[Reason] = field(default_factory=list)
+
+    def add(self, member: Member, test: str, estimate: Estimate, why: str = "") -> None:
+        """Add a point, or to `left_out` why not: no finite value, a bound, given, or `why`."""
+        estimate = in_unit(estimate, self.unit)
+        if not why and not math.isfinite(estimate.value):
+            why = "not found"
+        if not why and estimate.kind in BOUNDS:
+            why = "a bound"
+        if not why and estimate.origin is Origin.GIVEN:
+            why = "given, not measured"
+        if why:
+            self.left_out.append(f"{member.name}: {why}")
+        else:
+            self.points.append(Point(member, test, estimate))
+        if estimate.origin is Origin.CONTRADICTED:
+            self.wrong.append(estimate.reason)
+
+    def series(self, reason: Reason = NONE, **more: Any) -> Series:
+        """Create the series. `reason`: why no trend is estimated; by default from the points."""
+        values = [point.estimate.value for point in self.points]
+        if not reason and len(values) < LEAST:
+            whys = (why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in self.left_out)
+            counts = "; ".join(f"{why} in {count}" for why, count in Counter(whys).items())
+            reason = TOO_FEW_RUNS(runs=len(values), lost=f", {counts}" if counts else "")
+        if not reason and max(values) - min(values) <= 1e-12 * max(map(abs, values)):
+            reason = SAME_IN_ALL()
+        points, left_out = tuple(self.points), tuple(self.left_out)
+        return Series(unit=self.unit, points=points, left_out=left_out, reason=reason, **more)
 
 
-def made(
-    points: Sequence[Point], left_out: Sequence[str], reason: Reason = NONE, **more: object
-) -> Series:
-    """Create a series. `reason`: why no trend is estimated; by default checked from the points."""
-    values = [point.estimate.value for point in points]
-    if not reason and len(points) < LEAST:
-        whys = Counter(why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in left_out)
-        counts = "; ".join(f"{why} in {count}" for why, count in whys.items())
-        reason = TOO_FEW_RUNS(runs=len(points), lost=f", {counts}" if counts else "")
-    if not reason and max(values) - min(values) <= 1e-12 * max(map(abs, values)):
-        reason = SAME_IN_ALL()
-    return Series(
-        points=tuple(points),
-        left_out=tuple(left_out),
-        reason=reason,
-        **more,  # type: ignore[arg-type]
-    )
-
-
-def _series(found: _Collected) -> Series:
-    test, finding = found.test, found.finding
+def _series(test: AnalysedTest, finding: Finding, collected: Collected) -> Series:
     words = condition_words(test, finding.conditions)
     name = axis_quantity_name(test, finding.quantity)
     reason = FOLLOWS() if finding.quantity in DERIVED else NONE
-    if not reason and 2 * len(found.wrong) > len(found.points):
-        reason = WRONG_MODEL(side="most of it", why=found.wrong[0])
-    return made(
-        found.points,
-        found.left_out,
+    if not reason and 2 * len(collected.wrong) > len(collected.points):
+        reason = WRONG_MODEL(side="most of it", why=collected.wrong[0])
+    return collected.series(
         reason,
         test=test.name,
         title=test.title,
         quantity=finding.quantity,
         name=f"{name}, {words}" if words else name,
-        unit=finding.unit,
         display=display_unit(test, finding),
         conditions=finding.conditions,
     )
