@@ -133,6 +133,11 @@ def of_trials(numbers: Iterable[int]) -> str:
     return f"Trial{'s' if len(set(numbers)) > 1 else ''} {in_rows(numbers)}" if numbers else ""
 
 
+def capitalized(text: str) -> str:
+    """The text with a capital first letter; all other letters are unchanged."""
+    return text[:1].upper() + text[1:]
+
+
 def count(number: int, one: str, many: str = "") -> str:
     """`1 map`, `3 maps`."""
     return f"{number} {one if number == 1 else many or one + 's'}"

@@ -15,7 +15,7 @@ from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
 from campaign.report.drawing.changes_picture import MOST, PITCH, name_row
 from campaign.report.drawing.rows import set_rows
 from campaign.report.palette import MUTED, Look
-from campaign.text import pretty_unit
+from campaign.text import capitalized, pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,15 +62,14 @@ def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
     common = {n: v for n, v in first.conditions.items() if n not in _varied(pairs)}
     at = condition_words(first.test, common)
     if at:
-        ax.set_title(at[0].upper() + at[1:], fontsize=7.5, weight="normal", color=MUTED.light)
+        ax.set_title(capitalized(at), fontsize=7.5, weight="normal", color=MUTED.light)
     for row, pair in enumerate(pairs):
         own = zip((pair.reference, pair.other), LOOKS, (-0.16, 0.16), letters, strict=True)
         for estimate, look, shift, letter in own:
             _draw_number(ax, in_unit(estimate, unit), look, row + shift, letter if not row else "")
         name_row(ax, row, names[row], pair)
     set_rows(ax, (len(pairs) - 0.4, -0.6), len(pairs) - 1)
-    words = axis_quantity_name(first.test, first.quantity)
-    label = words[:1].upper() + words[1:]
+    label = capitalized(axis_quantity_name(first.test, first.quantity))
     ax.set_xlabel(f"{label} ({pretty_unit(unit)})" if unit else label)
 
 

@@ -17,6 +17,7 @@ from campaign.comparison.shared_systematics import shared_sources, source_called
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment
+from campaign.experiments.shared.captions import listed
 from campaign.experiments.shared.systematic import SOURCES
 from campaign.references.verdict import Verdict, with_verdicts
 
@@ -102,8 +103,7 @@ class Comparison:
         titles = [side.title for side in self.sides]
         names = [side.run.header.name for side in self.sides]
         reference, *others = titles if len(set(titles)) == len(titles) else names
-        compared = " and ".join(filter(None, (", ".join(others[:-1]), others[-1])))
-        return f"{compared} compared with {reference}"
+        return f"{listed(others)} compared with {reference}"
 
     @property
     def tested(self) -> int:

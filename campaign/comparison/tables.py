@@ -18,7 +18,7 @@ from campaign.estimation.difference import BOUNDS, in_unit
 from campaign.reason import Reason
 from campaign.references.verdict import Verdict
 from campaign.result import Cell, Column, Finding, Table
-from campaign.text import interval, pretty_unit
+from campaign.text import count, interval, pretty_unit
 
 
 def pair_table(key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str]) -> Table:
@@ -169,17 +169,14 @@ def sentences(against: Against, tested: int) -> Iterator[str]:
     yield from common_draws(against.pairing)
     if against.equal:
         return
-    several = len(pairs) != 1
-    yield (
-        f"{len(pairs)} number{'s are' if several else ' is'} found in both runs,"
-        f" {judged} of which can be tested."
-    )
+    found = count(len(pairs), "number is", "numbers are")
+    yield f"{found} found in both runs, {judged} of which can be tested."
     different = len(against.of(Verdict.DIFFERENT))
     if different:
-        are = "is" if different == 1 else "are"
+        numbers = count(different, "is", "are")
         yield (
-            f"{different} {are} declared different: at most 5 % of what is declared so is expected"
-            f" to be false (Benjamini and Hochberg over {tested} tests)."
+            f"{numbers} declared different: at most 5 % of what is declared so is expected to be"
+            f" false (Benjamini and Hochberg over {tested} tests)."
         )
     elif judged:
         yield (
@@ -188,14 +185,13 @@ def sentences(against: Against, tested: int) -> Iterator[str]:
         )
     bounds = len(against.of(Verdict.BEYOND_BOUND))
     if bounds:
-        lie = "lies" if bounds == 1 else "lie"
-        yield f"{bounds} more {lie} beyond a bound; no test is made of that."
+        yield f"{count(bounds, 'more lies', 'more lie')} beyond a bound; no test is made of that."
     bare = against.without_interval
     if bare:
         equal = len(bare) - len(bare_differing(against))
         yield (
-            f"Of {len(bare)} simulated without an interval {equal}"
-            f" {'is' if equal == 1 else 'are'} equal to the last digit."
+            f"Of {len(bare)} simulated without an interval {count(equal, 'is', 'are')} equal to the"
+            " last digit."
         )
 
 

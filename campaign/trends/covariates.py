@@ -10,7 +10,7 @@ import numpy as np
 
 from campaign.channels import TEMPERATURE
 from campaign.errors import UsageError
-from campaign.text import pretty_unit
+from campaign.text import capitalized, pretty_unit
 from campaign.trends.members import Member
 from campaign.trends.series import Series
 from campaign.trial import Outcome, Role
@@ -160,7 +160,7 @@ def _tag(name: str, members: Sequence[Member]) -> Covariate:
             ) from None
     return Covariate(
         name,
-        name[:1].upper() + name[1:],
+        capitalized(name),
         unit,
         pretty_unit(unit) or f"unit of {name}",
         1.0,
@@ -207,7 +207,7 @@ def _of_series(one: Series) -> Covariate:
     shown = {p.member.number: one.scale * p.estimate.value for p in one.points}
     return Covariate(
         f"{one.test}: {one.name}",
-        one.name[:1].upper() + one.name[1:],
+        capitalized(one.name),
         one.display,
         pretty_unit(one.display) or "unit",
         1.0,

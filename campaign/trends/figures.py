@@ -12,6 +12,7 @@ from campaign.estimation.difference import in_unit
 from campaign.estimation.intervals import LEVEL
 from campaign.estimation.trends.changes import Trend
 from campaign.result import Axis, Curve, Figure, Mark, Panel
+from campaign.text import capitalized
 from campaign.trends.covariates import Covariate
 from campaign.trends.rig_trends import Trends, TrendSeries, Verdict
 
@@ -29,7 +30,7 @@ def declared_figure(each: TrendSeries, trends: Trends, headline: str, place: int
     """Figure of one declared number."""
     return Figure(
         f"declared-{place}",
-        each.series.name[:1].upper() + each.series.name[1:],
+        capitalized(each.series.name),
         f"{headline}. Bars are 95 % intervals of each run alone"
         + ("; the band is that of the line." if each.verdict is not Verdict.JUMPED else
            "; lines are the levels before and behind."),
@@ -65,7 +66,7 @@ def _panel(each: TrendSeries, covariate: Covariate, *, small: bool) -> Panel:
         marks = [_mark(each, jump.place) for jump in each.jumps]
     elif each.trend is not None:
         curves.append(_line(each, each.trend, "" if small else "trend"))
-    name, _, words = (series.name[:1].upper() + series.name[1:]).partition(", ")
+    name, _, words = capitalized(series.name).partition(", ")
     title = f"{series.test}: {words}" if words else series.test
     title = title if len(title) <= TITLE else f"{title[: TITLE - 1]}…"
     return Panel(

@@ -19,6 +19,7 @@ from campaign.report.formats.interface import Format
 from campaign.report.page.article import Article, PageParts, Part, damage_text, problems_part
 from campaign.report.page.folder import Folder
 from campaign.report.page.pieces import Files, Items, Paragraph, Piece
+from campaign.text import capitalized
 from campaign.trends.figures import declared_figure, small_multiples
 from campaign.trends.rig_trends import WITHIN, Trends, TrendSeries, Verdict
 from campaign.trends.tables import (
@@ -187,7 +188,7 @@ def _declared(
     """Headline of a declared number, and its pieces."""
     sentence = headline(each, trends)
     drawn = making.drawn(declared_figure(each, trends, sentence, place))
-    notes = (f"{note[:1].upper()}{note[1:]}." for note in each.notes if note != WITHIN)
+    notes = (f"{capitalized(note)}." for note in each.notes if note != WITHIN)
     beside = filter(None, (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps)))
     caution = f"; {WITHIN}" if WITHIN in each.notes else ""
     pieces: list[Piece] = [] if drawn is None else [drawn]

@@ -13,7 +13,7 @@ from campaign.estimation.family import RATE
 from campaign.estimation.trends.changes import LEAST_FOR_A_JUMP, Jump
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
-from campaign.text import interval, number, pretty_unit
+from campaign.text import capitalized, count, interval, number, pretty_unit
 from campaign.trends.covariates import ORDER, TIME, Covariate
 from campaign.trends.rig_trends import JUMP, TREND, Trends, TrendSeries, Verdict
 
@@ -195,8 +195,7 @@ def jump_of(each: TrendSeries, jump: Jump) -> tuple[Estimate, Estimate]:
 
 def headline(each: TrendSeries, trends: Trends) -> str:
     """Sentence on a declared number, without a period."""
-    name = each.series.name[:1].upper() + each.series.name[1:]
-    phrases = [f"{name} ({each.series.test})"]
+    phrases = [f"{capitalized(each.series.name)} ({each.series.test})"]
     if each.verdict is not Verdict.JUMPED:
         follows = trends.covariate.name in (TIME, ORDER)
         verb = "drifts by" if follows else f"follows {trends.covariate.name}:"
@@ -228,26 +227,25 @@ def beside_the_jump(each: TrendSeries, jump: Jump, trends: Trends) -> str:
 
 def sentences(trends: Trends) -> Iterator[str]:
     """Sentences that summarize the trends."""
-    count, judged = len(trends.members), trends.judged
-    several = judged != 1
+    runs, judged = len(trends.members), trends.judged
     yield (
-        f"{count} runs have {len(trends.followed)} numbers in common, of which {judged} "
-        f"{'are' if several else 'is'} judged."
+        f"{runs} runs have {len(trends.followed)} numbers in common, of which "
+        f"{count(judged, 'is', 'are')} judged."
     )
     declared = len(trends.declared)
     along = trends.covariate.name
     if declared:
-        are = "is" if declared == 1 else "are"
+        numbers = count(declared, "is", "are")
         yield (
-            f"{declared} {are} declared to change: at most {100 * RATE:g} % of what is declared "
-            f"so is expected to be false (Benjamini and Hochberg over {trends.tested} tests)."
+            f"{numbers} declared to change: at most {100 * RATE:g} % of what is declared so is "
+            f"expected to be false (Benjamini and Hochberg over {trends.tested} tests)."
         )
     elif judged:
         yield (
             f"No trend over {along} is shown. That does not say that there is none: the table says "
             "of each number how large one would have been seen."
         )
-    if trends.covariate.ordered and count < LEAST_FOR_A_JUMP:
+    if trends.covariate.ordered and runs < LEAST_FOR_A_JUMP:
         yield f"Whether anything has jumped is not determined: that takes {LEAST_FOR_A_JUMP} runs."
     yield from trends.notes
 

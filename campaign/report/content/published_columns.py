@@ -17,6 +17,7 @@ from campaign.published.values import PublishedTable, heading_of
 from campaign.report.content.lines import cell_name
 from campaign.report.content.tables import PUBLISHED
 from campaign.result import Column, Finding, Table, Value, bare
+from campaign.text import capitalized
 from campaign.units import convert
 
 NUMBERS = ("equal", "near")
@@ -104,5 +105,4 @@ def _sources(cells: Sequence[PublishedCell]) -> Iterator[str]:
         if cell.status:
             doubtful.setdefault(cell.status, []).append(cell_name(cell))
     for status, names in doubtful.items():
-        head = f"{status[:1].upper()}{status[1:]} among them"
-        yield f"{head}: {', '.join(dict.fromkeys(names))}."
+        yield f"{capitalized(status)} among them: {', '.join(dict.fromkeys(names))}."

@@ -32,7 +32,7 @@ from campaign.references.verdict import JudgedNumber, Verdict, with_verdicts
 from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Cell, Column, Finding, Table
-from campaign.text import number, quantity_words
+from campaign.text import count, number, quantity_words
 from campaign.trial import Trial
 from campaign.units import same_dimension
 
@@ -289,11 +289,11 @@ def _told_of(pairs: Sequence[JudgedNumber], source: Source, units: TestUnits) ->
         more = f"; {len(changed) - NAMED} more" if len(changed) > NAMED else ""
         parts.append(f"{len(changed)} of {tested} numbers {source.differ}: {named}{more}")
     elif tested:
-        numbers = "1 number does" if tested == 1 else f"{tested} numbers do"
+        numbers = count(tested, "number does", "numbers do")
         parts.append(f"{numbers} not differ from {source.before}, as far as the intervals show")
     if beyond:
-        lie = "1 number lies" if beyond == 1 else f"{beyond} numbers lie"
-        parts.append(f"{lie} beyond a bound, of which no test is made")
+        numbers = count(beyond, "number lies", "numbers lie")
+        parts.append(f"{numbers} beyond a bound, of which no test is made")
     return "; ".join(parts)
 
 

@@ -25,7 +25,7 @@ from campaign.physics.truth import simulated
 from campaign.physics.variation import as_it_is, of_its_day
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Cell, Column, Finding, Table, Value
-from campaign.text import number, path_words, quantity_words
+from campaign.text import capitalized, number, path_words, quantity_words
 from campaign.trial import Tree, Trial, canonical_json
 
 Row = Mapping[str, Cell]
@@ -107,7 +107,7 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
     left_out = dict.fromkeys(why for row, why in pairs if why and row["inside"] != "")
     note = held(rows) or "None of these numbers has an interval"
     note += f"; {' and '.join(left_out)} are not counted." if left_out else "."
-    note += "".join(f" {_capital(each)}." for each in biases(rows))
+    note += "".join(f" {capitalized(each)}." for each in biases(rows))
     if any(trial.truth for trial in trials):
         note += " Plan and analysis were given the stated bench, not this one."
     return Table(
@@ -208,10 +208,6 @@ def duplicate_of(finding: Finding, others: Sequence[Finding]) -> str:
     if finding.conditions != free and any(each.conditions == free for each in beside):
         return "fits of the same points with the exponent held"
     return ""
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _row(

@@ -20,7 +20,7 @@ from campaign.physics.bench_knowledge import number_at
 from campaign.protocol.shapes import Shape, shape_at
 from campaign.report.content.protocol_units import leaves_of, written_units
 from campaign.result import Table
-from campaign.text import number, path_words, pretty_unit
+from campaign.text import capitalized, number, path_words, pretty_unit
 from campaign.units import Quantity, convert
 
 LISTED = 12
@@ -94,8 +94,7 @@ class TestUnits:
             set_ = column.exact or column.name in self._swept
             unit = self.of(column.name) if set_ else None
             if column.label == column.name:
-                words = path_words(column.name)
-                column = replace(column, label=words[:1].upper() + words[1:])
+                column = replace(column, label=capitalized(path_words(column.name)))
             if unit is not None and column.unit in ("", unit.si):
                 column = replace(column, unit=unit.si, display=unit.unit)
             columns.append(column)
