@@ -43,6 +43,11 @@ def same_value(one: Value, other: Value) -> bool:
     return str(one) == str(other)
 
 
+def meets(stated: Mapping[str, Value], wanted: Mapping[str, Value]) -> bool:
+    """Whether the stated conditions include each of the wanted ones, with the same value."""
+    return all(name in stated and same_value(stated[name], value) for name, value in wanted.items())
+
+
 @dataclass(frozen=True)
 class Finding:
     """One number of an analysis, with its conditions; matched to published cells by them.
@@ -139,6 +144,11 @@ class Column:
     decimals: int = 0
     file_only: bool = False
 
+    @property
+    def shown_unit(self) -> str:
+        """Unit of the page."""
+        return self.display or self.unit
+
 
 @dataclass(frozen=True)
 class Table:
@@ -173,6 +183,11 @@ class Axis:
     scale: Literal["linear", "log"] = "linear"
     limits: tuple[float, float] | None = None
     places: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit of the page."""
+        return self.display or self.unit
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,6 @@ def article_of(comparison: Comparison) -> Article:
     damage = [damage_text(each.letter, each.damaged) for each in comparison.sides if each.damaged]
     others = "; each of the others is compared with it" if several else ""
     return Article(
-        name=NAME,
         kind="Comparison",
         command=shlex.join(["campaign", "compare", *(s.run.name for s in comparison.sides)]),
         title=comparison.title,

@@ -65,7 +65,6 @@ def article_of(trends: Trends, command: str) -> Article:
     first, last = trends.members[0], trends.members[-1]
     header = first.run.header
     return Article(
-        name=NAME,
         kind="Trends",
         command=command,
         title=title_of(trends),

@@ -32,6 +32,8 @@ from campaign.report.content.truth import truth_tables
 from campaign.result import Table
 
 NO_FILES: Files = {}
+FAILED = 200
+"""Maximum number of listed failed trials; the archive has all."""
 ANEW = "the program that made this page, whatever is archived"
 
 

@@ -18,7 +18,6 @@ from campaign.report.content.lines import cell_name
 from campaign.report.content.tables import PUBLISHED
 from campaign.result import Column, Finding, Table, Value, bare
 from campaign.text import capitalized
-from campaign.units import convert
 
 NUMBERS = ("equal", "near")
 """Relations of cells that are numbers and not claims."""
@@ -48,7 +47,7 @@ def with_published(
         PUBLISHED, "Published", column.unit, column.display, exact=True, decimals=decimals
     )
     rows = (
-        {**row, PUBLISHED: None if cell is None else value_in(cell, column.unit)}
+        {**row, PUBLISHED: None if cell is None else cell.in_unit(column.unit)}
         for row, cell in zip(table.rows, cells, strict=True)
     )
     return replace(
@@ -86,14 +85,6 @@ def cell_of(
         ),
         None,
     )
-
-
-def value_in(cell: PublishedCell, unit: str) -> float | None:
-    """A published number in another unit; None for an incompatible unit."""
-    try:
-        return float(convert(cell.value, cell.unit, unit))
-    except ValueError:
-        return None
 
 
 def _sources(cells: Sequence[PublishedCell]) -> Iterator[str]:

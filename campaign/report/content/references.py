@@ -20,6 +20,7 @@ from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
 from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
 from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench
@@ -177,7 +178,7 @@ def _bench(trial: Trial) -> Bench | None:
 def _of_file(path: Path, values: Sequence[ReferenceValue], units: TestUnits) -> Found:
     own = [(value, each) for value in values for each in _to_compare(_spoken_of(value, units))]
     known = list({id(finding): finding for _, finding in own}.values())
-    pairs = [_pair(value.in_unit_of(finding), finding, known) for value, finding in own]
+    pairs = [_pair(in_unit(value.estimate, each.unit), each, known) for value, each in own]
     name = path.name
     title = f"Reference values of {name}, and found"
     said = f"The reference values are of {name}"

@@ -89,7 +89,7 @@ def show(table: Table, *, once: bool = True) -> ShownTable:
         common, columns, rows = _said_once(columns, rows)
     shown = [_shown_column(column, rows) for column in columns]
     headers = tuple(
-        f"{column.label} ({pretty_unit(_unit(column))})" if _unit(column) else column.label
+        f"{column.label} ({pretty_unit(column.shown_unit)})" if column.shown_unit else column.label
         for column in columns
     )
     notes = ([f"In all rows: {'; '.join(common)}."] if common else []) + list(remarks(table))
@@ -122,7 +122,9 @@ def _said_once(
             unit = str(cells[0])
         elif len(words) == len(cells) or (column.exact and not _takes_unit(column, rows)):
             text = _shown_column(column, rows)[0].text
-            texts.append(" ".join(filter(None, (column.label, text, pretty_unit(_unit(column))))))
+            texts.append(
+                " ".join(filter(None, (column.label, text, pretty_unit(column.shown_unit))))
+            )
         else:
             kept.append(column)
     if unit:
@@ -133,7 +135,7 @@ def _said_once(
 def _takes_unit(column: Column, rows: Sequence[Mapping[str, Cell]]) -> bool:
     """Whether the unit of the row applies to a column: its numbers are no counts."""
     cells = [row.get(column.name) for row in rows]
-    return not _unit(column) and any(isinstance(cell, float | Estimate) for cell in cells)
+    return not column.shown_unit and any(isinstance(cell, float | Estimate) for cell in cells)
 
 
 def table_csv(table: Table) -> str:
@@ -305,10 +307,6 @@ def data_link(text: str) -> str:
     return "data:text/csv;charset=utf-8," + quote(text, safe="!$()*+,-./:;=?@_~")
 
 
-def _unit(column: Column) -> str:
-    return column.display or column.unit
-
-
 def _displayed(value: Value, column: Column) -> Value:
     if isinstance(value, int | float) and not isinstance(value, bool) and column.display:
         return float(convert(float(value), column.unit, column.display))
@@ -369,7 +367,7 @@ def _text(value: Value, negligible: float, decimals: int = 0) -> str:
 
 
 def _csv_name(column: Column) -> str:
-    unit = _unit(column).replace("%", "percent").replace("^", "").replace("/", " per ")
+    unit = column.shown_unit.replace("%", "percent").replace("^", "").replace("/", " per ")
     words = re.findall(r"\w+", f"{column.name} {unit}")
     return "_".join(words)
 

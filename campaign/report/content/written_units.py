@@ -146,7 +146,7 @@ class TestUnits:
         for table in self.test.result.tables:
             for column in table.columns:
                 if column.name == path and column.unit:
-                    unit = column.display or column.unit
+                    unit = column.shown_unit
                     return DisplayUnit(column.unit, unit, convert(1.0, unit, column.unit))
         return None
 

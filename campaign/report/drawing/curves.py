@@ -279,4 +279,4 @@ def spare_rounding_errors(ax: Axes, values: Sequence[Array]) -> None:
 
 def scale_of(axis: Axis) -> float:
     """Factor from the axis' unit to its display unit."""
-    return factor(axis.unit, axis.display) if axis.display and axis.display != axis.unit else 1.0
+    return 1.0 if axis.shown_unit == axis.unit else factor(axis.unit, axis.shown_unit)

@@ -322,7 +322,7 @@ def _limit_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
 
 def axis_label(axis: Axis) -> str:
     """`label (unit)` in the display unit; an axis of named places has no unit."""
-    unit = "" if axis.places else axis.display or axis.unit
+    unit = "" if axis.places else axis.shown_unit
     if unit and axis.label.endswith(")"):
         return f"{axis.label[:-1]}, {pretty_unit(unit)})"
     return f"{axis.label} ({pretty_unit(unit)})" if unit else axis.label

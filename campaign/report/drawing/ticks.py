@@ -65,7 +65,7 @@ def set_ticks(
     if _counts(axis, values):
         drawn.set_major_locator(MaxNLocator(nbins=10, integer=True))
         drawn.set_minor_locator(AutoMinorLocator(1))
-    elif (axis.display or axis.unit) == "deg" and high - low >= WIDE_ANGLE:
+    elif axis.shown_unit == "deg" and high - low >= WIDE_ANGLE:
         steps = [step for step in TURN if high - low <= MOST_STEPS * step]
         drawn.set_major_locator(MultipleLocator(steps[0]) if steps else MaxNLocator(nbins=8))
 
@@ -128,7 +128,7 @@ def _counts(axis: Axis, values: Sequence[Array]) -> bool:
     shown = [each[np.isfinite(each)] for each in values]
     total = sum(each.size for each in shown)
     whole = all(bool(np.all(each == np.round(each))) for each in shown)
-    return not (axis.display or axis.unit) and total > 0 and whole
+    return not axis.shown_unit and total > 0 and whole
 
 
 def _plain(value: float, position: Any) -> str:

@@ -345,6 +345,6 @@ def _provenance(document: Document) -> data.Provenance:
 
 def _display(shown: result.Column | result.Axis) -> dict[str, Any]:
     """Display unit, and the factor that converts a number to it."""
-    display = shown.display or shown.unit
-    same = display == shown.unit
-    return {"display": display, "factor": 1.0 if same else float(factor(shown.unit, display))}
+    same = shown.shown_unit == shown.unit
+    scale = 1.0 if same else float(factor(shown.unit, shown.shown_unit))
+    return {"display": shown.shown_unit, "factor": scale}

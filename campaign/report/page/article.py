@@ -37,7 +37,6 @@ class Article:
     """A page: title, facts and sections in order.
 
     Attributes:
-        name: name of its files, without suffix.
         kind: kind of page, in a word.
         command: command that writes it.
         facts: groups of facts, with a letter if there are several.
@@ -45,7 +44,6 @@ class Article:
         content: data for its JSON file only.
     """
 
-    name: str
     kind: str
     command: str
     title: str

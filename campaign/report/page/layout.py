@@ -159,8 +159,11 @@ def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str
     closeness = None if close is None else folder.shown_table(close, (), close.key)
     sections = _sections(document, makers)
     happened = document.incidents
-    figures = tuple(_of_incident(figure, folder, command) for figure in happened.figures)
-    shown = tuple(_table_of_incident(table, folder) for table in happened.tables)
+    figures = tuple(
+        folder.figure(each, Drawing(each).made(), (), f"incidents-{each.key}", command=command)
+        for each in happened.figures
+    )
+    shown = tuple(folder.shown_table(each, (), f"incidents-{each.key}") for each in happened.tables)
     problems = (
         *without_trials(document.run, document.tests),
         *(f"{s.test.name}: {p}" for s in sections for p in _problems(s)),
@@ -240,16 +243,6 @@ def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section
         expected = document.truths.get(test.name), (stated, *files)
         sections.append(_section(place, makers[test.name], document.scoreboard, tables_, expected))
     return tuple(sections)
-
-
-def _of_incident(figure: Figure, folder: Folder, command: str) -> ShownFigure:
-    return folder.figure(
-        figure, Drawing(figure).made(), (), f"incidents-{figure.key}", command=command
-    )
-
-
-def _table_of_incident(table: Table, folder: Folder) -> ShownTable:
-    return folder.shown_table(table, (), f"incidents-{table.key}")
 
 
 def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
