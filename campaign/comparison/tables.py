@@ -14,7 +14,7 @@ from campaign.comparison.draws import common_draws
 from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.run_comparison import Against, size_of
 from campaign.estimate import Estimate
-from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.estimation.difference import in_unit
 from campaign.reason import Reason
 from campaign.references.verdict import Verdict
 from campaign.result import Cell, Column, Finding, Table
@@ -119,7 +119,7 @@ def number_of(estimate: Estimate, unit: str) -> str:
     """Text of an estimate in a unit, without the unit."""
     shown = in_unit(estimate, unit)
     low, high = shown.combined
-    if shown.kind in ("at least", "at most"):
+    if shown.is_bound:
         sign, end = ("≥", low) if shown.kind == "at least" else ("≤", high)
         return f"{sign} {interval(end, None, None)}"
     return interval(shown.value, low, high)
@@ -134,7 +134,7 @@ def change_of(pair: Pair) -> str:
     value, low, high = (
         None if end is None else 100 * end for end in (change.value, *change.combined)
     )
-    if change.kind in ("at least", "at most"):
+    if change.is_bound:
         return f"{number_of(change, 'percent')} %"
     if math.isnan(change.value):
         return _difference_of(pair)
@@ -150,7 +150,7 @@ def _difference_of(pair: Pair) -> str:
     text = number_of(difference, pair.display)
     if math.isnan(difference.value) or text == "–":
         return "–"
-    sign = "+" if difference.value > 0 and difference.kind not in BOUNDS else ""
+    sign = "+" if difference.value > 0 and not difference.is_bound else ""
     return f"{sign}{text} {pretty_unit(pair.display)}".rstrip()
 
 

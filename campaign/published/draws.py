@@ -58,7 +58,7 @@ def together(findings: Sequence[Finding], seeds: Collection[Value] = ()) -> Find
     ]
     usable = [
         math.isfinite(each.value)
-        and each.known.kind not in ("at least", "at most")
+        and not each.known.is_bound
         and each.known.origin is not Origin.NOT_DETERMINED
         for each in findings
     ]

@@ -22,7 +22,7 @@ from campaign.comparison.not_judged import DERIVED, FOLLOWS
 from campaign.comparison.same_quantity import pair_tests
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.contrast import is_student
-from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.estimation.difference import in_unit
 from campaign.estimation.intervals import LEVEL, student
 from campaign.estimation.trends.own_errors import moderated
 from campaign.reason import NONE, Cause, Reason
@@ -162,7 +162,7 @@ class Collected:
         estimate = in_unit(estimate, self.unit)
         if not why and not math.isfinite(estimate.value):
             why = "not found"
-        if not why and estimate.kind in BOUNDS:
+        if not why and estimate.is_bound:
             why = "a bound"
         if not why and estimate.origin is Origin.GIVEN:
             why = "given, not measured"

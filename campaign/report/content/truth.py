@@ -188,7 +188,7 @@ def _deviation(row: Row) -> float | None:
     estimate, true = row["found"], row["true"]
     if not isinstance(estimate, Estimate) or not isinstance(true, float) or not true:
         return None
-    if estimate.kind in ("at least", "at most"):
+    if estimate.is_bound:
         return None
     return None if math.isnan(estimate.value) else 100.0 * (estimate.value - true) / abs(true)
 
