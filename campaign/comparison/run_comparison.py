@@ -110,11 +110,6 @@ class Comparison:
         """Size of the family: all pairs of all runs that have a p value."""
         return sum(each.tested for each in self.against)
 
-    @property
-    def different(self) -> tuple[Pair, ...]:
-        """Pairs that are declared different."""
-        return tuple(pair for each in self.against for pair in each.of(Verdict.DIFFERENT))
-
 
 def _same(one: Estimate, other: Estimate) -> bool:
     same = one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))

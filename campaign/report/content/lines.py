@@ -93,7 +93,6 @@ class ScoredTable:
 
     Attributes:
         anchor: anchor of its complete numbers on the page; "" without one.
-        tests: names of the tests that measured them.
         compared, good: counts of compared and of reproduced numbers, without those that the
             document makes impossible to reproduce.
     """
@@ -101,7 +100,6 @@ class ScoredTable:
     table: str
     title: str
     anchor: str
-    tests: tuple[str, ...]
     lines: tuple[ShownLine, ...]
     compared: int
     good: int
@@ -120,7 +118,6 @@ def scored_tables(
                 table=name,
                 title=published[name].title,
                 anchor=anchors.get(name, ""),
-                tests=tuple(dict.fromkeys(line.test for line in lines if line.test)),
                 lines=tuple(map(shown_line, lines)),
                 compared=len(compared),
                 good=sum(line.verdict in GOOD for line in compared),

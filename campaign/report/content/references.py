@@ -30,10 +30,10 @@ from campaign.physics.true_values import QUANTITIES
 from campaign.reason import Cause
 from campaign.references.values import ReferenceValue
 from campaign.references.verdict import JudgedNumber, Verdict, with_verdicts
-from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of
+from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of, signed
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Cell, Column, Finding, Table
-from campaign.text import count, number, quantity_words
+from campaign.text import count, quantity_words
 from campaign.trial import Trial
 from campaign.units import same_dimension
 
@@ -302,16 +302,11 @@ def _told(pair: JudgedNumber, units: TestUnits) -> str:
     words, change = _name(pair, units), pair.found.change
     if math.isnan(change.value):
         return words
-    size = f"{words} by {_signed(change.value)} %"
-    low, high = (None if end is None else _signed(end) for end in change.combined)
+    size = f"{words} by {signed(100.0 * change.value)} %"
+    low, high = (None if end is None else signed(100.0 * end) for end in change.combined)
     return size if None in (low, high) or low == high else f"{size} ({low} to {high} %)"
 
 
 def _name(pair: JudgedNumber, units: TestUnits) -> str:
     where = conditions_text(pair.conditions, units)
     return f"{quantity_words(pair.quantity)} ({where})" if where else quantity_words(pair.quantity)
-
-
-def _signed(share: float) -> str:
-    """A share as text in percent with its sign."""
-    return f"{'+' if share > 0 else ''}{number(100.0 * share, 2)}"

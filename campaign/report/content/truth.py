@@ -162,16 +162,17 @@ def _bias(quantity: str, off: Array, source: str) -> str:
     """
     mean, low, high = float(np.mean(off)), float(np.min(off)), float(np.max(off))
     if low > 0 or high < 0:
-        ends = " to ".join(_signed(end) for end in sorted((low, high), key=abs))
+        ends = " to ".join(signed(end) for end in sorted((low, high), key=abs))
         where = f"bias {ends} % ({len(off)} of {len(off)}; exceeds scatter)"
     else:
-        ends = f"{_signed(low)} to {_signed(high)} %"
-        where = f"bias {_signed(mean)} % (mean of {len(off)}, {ends}; exceeds scatter)"
+        ends = f"{signed(low)} to {signed(high)} %"
+        where = f"bias {signed(mean)} % (mean of {len(off)}, {ends}; exceeds scatter)"
     text = f"{quantity}: {where}"
     return f"{text}; largest systematic part: {in_axis_terms(source)}" if source else text
 
 
-def _signed(value: float) -> str:
+def signed(value: float) -> str:
+    """A number with its sign, as text of two digits."""
     return f"+{number(value, 2)}" if value > 0 else number(value, 2)
 
 
