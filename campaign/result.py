@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,11 @@ TOLERANCE = 1e-3
 """Relative tolerance for equal numbers of a condition, relative to the larger."""
 NOTHING = 1e-9
 """Absolute tolerance for equal numbers of a condition (SI): 1e-17 rad equals 0."""
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a number; True and False are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def same_value(one: Value, other: Value) -> bool:

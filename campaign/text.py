@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import difflib
+import io
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -84,6 +86,23 @@ def _to(value: float, place: int, power: int) -> str:
     rounded = round(value, -place) / 10.0**power if place > 0 else value / 10.0**power
     text = f"{rounded:.{max(0, power - place)}f}"
     return minus(text if float(text) else text.removeprefix("-"))
+
+
+def csv_text(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """CSV text with every digit of a float, `true` or `false`, and an empty cell for None."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(headers)
+    writer.writerows([_exact(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _exact(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(float(value)) if isinstance(value, float) else str(value)
 
 
 def percent(value: float | None) -> str:

@@ -30,8 +30,6 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
 
     sides, findings: of the reference and of the other run.
     """
-    if findings[0].quantity in DERIVED:
-        return FOLLOWS()
     names = ("the reference", "the other")
     own = list(zip(names, sides, findings, strict=True))
     alone = [name for name, test, finding in own if trials_behind(test, finding) == 1]

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.estimation.difference import in_unit
 from campaign.estimation.intervals import LEVEL
@@ -15,8 +14,6 @@ from campaign.result import Axis, Curve, Figure, Mark, Panel
 from campaign.text import capitalized
 from campaign.trends.covariates import Covariate
 from campaign.trends.rig_trends import Trends, TrendSeries, Verdict
-
-Array = NDArray[np.float64]
 
 ALONG = 25
 """Points of a line and its band."""

@@ -14,8 +14,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
 from campaign.axis_kind import axis_terms
@@ -168,7 +166,7 @@ def _measured(run: RunReader, trial: Trial) -> bool:
 def _bench(trial: Trial) -> Bench | None:
     try:
         return bench_of(trial)
-    except (LookupError, ValidationError, ValueError):
+    except (LookupError, ValueError):
         return None
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from urllib.parse import quote
 
 from campaign.axis_kind import in_axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.reason import NONE
-from campaign.result import Cell, Column, Table, Value, bare
-from campaign.text import NARROW, SHORT, interval, minus, number, pretty_unit
+from campaign.result import Cell, Column, Table, Value, bare, is_number
+from campaign.text import NARROW, SHORT, csv_text, interval, minus, number, pretty_unit
 from campaign.units import convert
 
 ROWS = 300
@@ -157,14 +155,14 @@ def table_csv(table: Table) -> str:
     headers += [f"{_csv_name(column)}_origin" for column in flagged]
     rows = (
         [
-            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in first),
-            *(_exact(_displayed(end, c)) for c in ends for end in _ends(row.get(c.name))),
-            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in last),
+            *(_displayed(bare(row.get(c.name)), c) for c in first),
+            *(_displayed(end, c) for c in ends for end in _ends(row.get(c.name))),
+            *(_displayed(bare(row.get(c.name)), c) for c in last),
             *(_origin(row.get(c.name)) for c in flagged),
         ]
         for row in table.rows
     )
-    return _csv(headers, rows)
+    return csv_text(headers, rows)
 
 
 def _origin(cell: Cell) -> str:
@@ -252,7 +250,7 @@ def _placed(table: Table, column: Column) -> Iterator[tuple[int, Estimate | floa
     """Numeric cells of a column, also undetermined ones, each with the index of its row."""
     for place, row in enumerate(table.rows):
         cell = row.get(column.name)
-        if isinstance(cell, Estimate | float | int) and not isinstance(cell, bool):
+        if isinstance(cell, Estimate) or is_number(cell):
             yield place, cell
 
 
@@ -308,7 +306,7 @@ def data_link(text: str) -> str:
 
 
 def _displayed(value: Value, column: Column) -> Value:
-    if isinstance(value, int | float) and not isinstance(value, bool) and column.display:
+    if is_number(value) and column.display:
         return float(convert(float(value), column.unit, column.display))
     return value
 
@@ -318,7 +316,7 @@ def _shown_column(column: Column, rows: Sequence[Mapping[str, Cell]]) -> list[Sh
     cells = [row.get(column.name) for row in rows]
     values = [_displayed(bare(cell), column) for cell in cells]
     given = [value for value in values if value is not None]
-    numbers = [float(v) for v in given if isinstance(v, int | float) and not isinstance(v, bool)]
+    numbers = [float(value) for value in given if is_number(value)]
     right = bool(numbers) and len(numbers) == len(given)
     largest = max((abs(v) for v in numbers if math.isfinite(v)), default=0.0)
 
@@ -370,19 +368,3 @@ def _csv_name(column: Column) -> str:
     unit = column.shown_unit.replace("%", "percent").replace("^", "").replace("/", " per ")
     words = re.findall(r"\w+", f"{column.name} {unit}")
     return "_".join(words)
-
-
-def _exact(value: Value) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(float(value)) if isinstance(value, float) else str(value)
-
-
-def _csv(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(headers)
-    writer.writerows(rows)
-    return text.getvalue()

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
@@ -86,7 +85,7 @@ class Benches:
         try:
             stated = bench_of(trial)
             return simulated(self.plants[trial.truth], stated) if trial.truth else stated
-        except (LookupError, ValidationError, ValueError):
+        except (LookupError, ValueError):
             return None
 
 

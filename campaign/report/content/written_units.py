@@ -19,7 +19,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.bench_knowledge import number_at
 from campaign.protocol.shapes import Shape, shape_at
 from campaign.report.content.protocol_units import leaves_of, written_units
-from campaign.result import Table
+from campaign.result import Table, is_number
 from campaign.text import capitalized, number, path_words, pretty_unit
 from campaign.units import Quantity, convert
 
@@ -73,7 +73,7 @@ class TestUnits:
         unit = self.of(path)
         if any(isinstance(value, Mapping) for value in values):
             return "; ".join(self._tables(path, values))
-        numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
+        numbers = [value for value in values if is_number(value)]
         ends = [min(numbers), max(numbers)] if len(numbers) == len(values) > LISTED else values
         shown = [_plain(value, unit) for value in ends]
         text = ", ".join(shown)

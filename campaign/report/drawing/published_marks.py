@@ -14,7 +14,7 @@ from itertools import groupby, product
 import numpy as np
 
 from campaign.published.values import Cell, Published, PublishedTable
-from campaign.result import Array, Curve, Figure, Panel, Value, meets
+from campaign.result import Array, Curve, Figure, Panel, Value, is_number, meets
 
 DRAWN = ("equal", "near")
 """Relations of a cell that is a value ..."""
@@ -131,7 +131,7 @@ def _along(curve: Curve, cell: Cell) -> float | None:
     if not curve.along:
         return float(curve.x[0]) if len(curve.x) == 1 else None
     x = cell.conditions.get(curve.along)
-    return float(x) if isinstance(x, int | float) and not isinstance(x, bool) else None
+    return float(x) if is_number(x) else None
 
 
 def _range(x: Array) -> Array:
