@@ -233,15 +233,11 @@ def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section
     """Sections in the protocol's order; each published table is in that of its first test."""
     used: set[str] = set()
     sections = []
-    published = document.published
     for place, test in enumerate(document.tests, start=1):
-        own = [n for n in published if n in test.reproduces and n not in used]
-        used.update(own)
-        tables_ = [published[n] for n in own]
-        stated = document.references.stated.get(test.name)
-        files = document.references.files.get(test.name, ())
-        expected = document.truths.get(test.name), (stated, *files)
-        sections.append(_section(place, makers[test.name], document.scoreboard, tables_, expected))
+        names = [n for n in document.published if n in test.reproduces and n not in used]
+        used.update(names)
+        own = [document.published[name] for name in names]
+        sections.append(_section(place, makers[test.name], document, own))
     return tuple(sections)
 
 
@@ -253,10 +249,6 @@ def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
     return download
 
 
-Expected = tuple[Table | None, Sequence[ReferenceComparison | None]]
-"""True values of a test, and its references: the bench file first."""
-
-
 def _changes(compared: ReferenceComparison, maker: _Maker) -> ShownFigure | None:
     """Picture of a comparison of two or more numbers; None for fewer."""
     if len(compared.pairs) < 2:
@@ -266,21 +258,18 @@ def _changes(compared: ReferenceComparison, maker: _Maker) -> ShownFigure | None
 
 
 def _section(
-    place: int,
-    maker: _Maker,
-    scoreboard: Scoreboard,
-    published: Sequence[PublishedTable],
-    expected: Expected,
+    place: int, maker: _Maker, document: Document, published: Sequence[PublishedTable]
 ) -> Section:
-    test, folder = maker.test, maker.folder
+    """Section of a test; `published`: tables that are compared in this section."""
+    test, scoreboard, folder = maker.test, document.scoreboard, maker.folder
     left_out = tuple(_left_out(test))
-    truth, references = expected
+    truth, stated = document.truths.get(test.name), document.references.stated.get(test.name)
+    files = document.references.files.get(test.name, ())
     with axis_terms(test.sides):
         comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
-        prediction, *others = (
-            None if each is None else maker.table(each.table) for each in references
-        )
-        changes = [_changes(each, maker) for each in references if each is not None]
+        prediction = None if stated is None else maker.table(stated.table)
+        references = [maker.table(each.table) for each in files]
+        changes = [_changes(each, maker) for each in (stated, *files) if each is not None]
         figures = [
             maker.attempt(each.key, partial(maker.figure, each)) for each in test.result.figures
         ]
@@ -298,7 +287,7 @@ def _section(
             left_out=left_out,
             truth=None if truth is None else maker.table(truth),
             prediction=prediction,
-            references=tuple(filter(None, others)),
+            references=tuple(references),
             summary=summary_of(test),
         )
 
