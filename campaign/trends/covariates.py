@@ -13,7 +13,6 @@ from campaign.errors import UsageError
 from campaign.text import capitalized, pretty_unit
 from campaign.trends.members import Member
 from campaign.trends.series import Series
-from campaign.trial import Outcome, Role
 from campaign.units import factor, split_quantity
 
 TIME, ORDER = "time", "order"
@@ -110,8 +109,7 @@ def _measured_temperature(member: Member, test: str) -> float:
     """
     medians = []
     for each in (trial for one in member.tests for trial in one.trials):
-        trial, completed = each.trial, each.ending.outcome is Outcome.COMPLETED
-        if not completed or trial.role is not Role.MEASUREMENT or test not in ("", trial.test):
+        if not each.is_completed_measurement or test not in ("", each.trial.test):
             continue
         unit = next((c.unit for c in each.channels() if c.name == TEMPERATURE), None)
         if unit is None or each.not_kept:

@@ -12,7 +12,6 @@ from campaign.identify.material import ChosenRun
 from campaign.parameter import Parameter
 from campaign.trends.members import Member
 from campaign.trends.series import TWIN, Collected, Series
-from campaign.trial import Outcome, Role
 
 
 @dataclass(frozen=True)
@@ -77,11 +76,7 @@ def _section(
     member: Member, known: Mapping[str, Experiment], name: str, first: Section | None
 ) -> tuple[str, Section | None]:
     """Reason for no result, and a run's section; its structure is that of `first`, if any."""
-    trials = tuple(
-        each
-        for each in member.run.trials
-        if each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
-    )
+    trials = tuple(each for each in member.run.trials if each.is_completed_measurement)
     if not trials:
         return "no trial was completed", None
     chosen = ChosenRun(member.run, "", trials)

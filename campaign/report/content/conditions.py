@@ -14,9 +14,8 @@ from campaign.text import count, path_words
 from campaign.trial import Role, canonical_json
 
 
-def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterator[tuple[str, str]]:
+def conditions_of(test: AnalysedTest, units: TestUnits) -> Iterator[tuple[str, str]]:
     """Kind, bench, sweep and effective options as text, in the units of the protocol."""
-    units = units or TestUnits(test)
     yield "Experiment", test.kind
     if test.bench:
         yield (

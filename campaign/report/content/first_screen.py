@@ -17,7 +17,7 @@ from campaign.report.content.key_numbers import KeyNumber, shown_key_numbers
 from campaign.report.content.references import References
 from campaign.report.content.run_problems import wrong_with
 from campaign.report.content.truth import COUNTED, biases, held
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.written_units import TestUnits
 from campaign.result import Figure, Result, Table
 from campaign.text import count
 
@@ -122,13 +122,13 @@ class FirstScreen:
 def opening_of(
     run: RunReader,
     tests: Sequence[AnalysedTest],
+    units: Mapping[str, TestUnits],
     scoreboard: Scoreboard,
     truths: Mapping[str, Table],
     references: References,
-    damaged: Sequence[Damage] = (),
+    damaged: Sequence[Damage],
 ) -> FirstScreen:
     """First screen of a run's report; `damaged` is all damage that the report detected."""
-    units = units_of(tests, run.header)
     return FirstScreen(
         tuple(
             _answer(test, truths.get(test.name), references, scoreboard, units[test.name])

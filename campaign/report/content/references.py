@@ -29,7 +29,7 @@ from campaign.reason import Cause
 from campaign.references.values import ReferenceValue
 from campaign.references.verdict import JudgedNumber, Verdict, with_verdicts
 from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of, signed
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.written_units import TestUnits
 from campaign.result import Cell, Column, Finding, Table
 from campaign.text import count, quantity_words
 from campaign.trial import Trial
@@ -92,10 +92,10 @@ Files = Mapping[Path, Sequence[ReferenceValue]]
 Found = tuple[AnalysedTest, Source, Sequence[JudgedNumber]]
 
 
-def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -> References:
+def compared_with(
+    run: RunReader, tests: Iterable[AnalysedTest], units: Mapping[str, TestUnits], files: Files
+) -> References:
     """Compare each test's findings with its bench file and with `files`."""
-    tests = tuple(tests)
-    units = units_of(tests, run.header) if tests else {}
     comparisons: list[Found] = []
     for test in tests:
         with axis_terms(test.sides):

@@ -22,7 +22,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.true_values import QUANTITIES, true_of, true_value
 from campaign.physics.truth import simulated
 from campaign.physics.variation import as_it_is, of_its_day
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.written_units import TestUnits
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.text import capitalized, number, path_words, quantity_words
 from campaign.trial import Tree, Trial, canonical_json
@@ -44,12 +44,12 @@ COUNTED = "counted"
 """Key of a row, not a cell: False for a number that repeats others of the table."""
 
 
-def truth_tables(run: RunReader, tests: Iterable[AnalysedTest]) -> dict[str, Table]:
+def truth_tables(
+    run: RunReader, tests: Iterable[AnalysedTest], units: Mapping[str, TestUnits]
+) -> dict[str, Table]:
     """Table of true values and estimates of the simulated bench, by test."""
     if run.header.backend != SIMULATED:
         return {}
-    tests = tuple(tests)
-    units = units_of(tests, run.header)
     plants = run.header.truth.plants
     tables = {}
     for test in tests:

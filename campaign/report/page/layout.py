@@ -21,7 +21,7 @@ from campaign.report.content.published_columns import as_compared, with_publishe
 from campaign.report.content.references import ReferenceComparison
 from campaign.report.content.run_problems import without_trials
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.written_units import TestUnits
 from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.page.article import PageParts
 from campaign.report.page.drawings import (
@@ -203,14 +203,13 @@ def _makers(
     drawn: Drawn,
 ) -> Mapping[str, _Maker]:
     """Maker of figures and tables, by test."""
-    units, again = units_of(document.tests, document.run.header), f"{command} --only-figure"
     return {
         test.name: _Maker(
             folder=folder,
             problems=[test.problem] if test.problem else [],
             test=test,
-            units=units[test.name],
-            command=again,
+            units=document.units[test.name],
+            command=f"{command} --only-figure",
             drawings=drawings,
             awaited=drawn,
             published=document.published,
