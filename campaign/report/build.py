@@ -40,10 +40,6 @@ DAMAGED = 200
 """Maximum number of listed damages on the page; `tables/damaged.csv` has all."""
 
 
-def _nothing(_: Document) -> None:
-    """Do nothing: default of `when_found`."""
-
-
 @dataclass(frozen=True)
 class Report:
     """A finished report.
@@ -80,7 +76,7 @@ def build_report(
     trials: Sequence[int] = (),
     zoom: bool = False,
     command: str = "",
-    when_found: Callable[[Document], None] = _nothing,
+    when_found: Callable[[Document], None] = lambda _: None,
     references: Files = NO_FILES,
 ) -> Report:
     """Write `report.html`, `report.json`, `tables/` and `figures/` of `run` into `output`.
@@ -167,7 +163,7 @@ def render(
     at_work: Workers | None = None,
     zoom: bool = False,
     command: str = "",
-    when_found: Callable[[Document], None] = _nothing,
+    when_found: Callable[[Document], None] = lambda _: None,
     references: Files = NO_FILES,
 ) -> tuple[str, Folder, Report]:
     """Make the page's text, the other files and the report, without writing.

@@ -11,7 +11,7 @@ from campaign.identify.identification import Section, fitted_again, identify
 from campaign.identify.material import ChosenRun
 from campaign.parameter import Parameter
 from campaign.trends.members import Member
-from campaign.trends.series import TWIN, Collected, Series
+from campaign.trends.series import Collected, Seen, Series, why_twin
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
     first: Section | None = None
     fits: dict[str, tuple[Parameter, Collected]] = {}
     problems: list[str] = []
-    seen: dict[tuple[str, ...], Member] = {}
+    seen: Seen = {}
     for member in members:
         why, section = _section(member, known, name, first)
         if section is None or section.result is None:
@@ -54,8 +54,7 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
                 for each in section.identified.parameters
             }
         prints = tuple(text for own in member.identical.values() for text in own)
-        twin = seen.setdefault(prints, member) if prints else member
-        same = "" if twin is member else f"{TWIN} {twin.name}"
+        same = why_twin(seen, member, prints)
         for parameter in section.identified.parameters:
             if parameter.estimate.name in fits:
                 fits[parameter.estimate.name][1].add(member, "", parameter.estimate, same)

@@ -34,6 +34,8 @@ from campaign.units import convert
 Array = NDArray[np.float64]
 
 TWIN = "the same simulation as"
+Seen = dict[tuple[str, tuple[str, ...]], Member]
+"""First run with simulated trials, by test and fingerprints."""
 TOO_FEW_RUNS = Cause("too few runs", "found in {runs} runs{lost}: three are the least")
 SAME_IN_ALL = Cause("same in all runs", "it is the same in all runs, to the last digit")
 
@@ -132,12 +134,12 @@ def series_of(members: Sequence[Member]) -> list[Series]:
         for finding in test.result.findings
         if not finding.recomputed
     }
-    seen: dict[tuple[str, tuple[str, ...]], Member] = {}
+    seen: Seen = {}
     for member in members:
         for pair in pair_tests(reference.tests, member.tests).tests:
-            twin = _twin(seen, member, pair.other.name, pair.reference.name)
+            prints = member.identical.get(pair.other.name, ())
+            why = why_twin(seen, member, prints, pair.reference.name)
             for one, other in pair.findings:
-                why = f"{TWIN} {twin.name}" if twin else ""
                 collected[id(one)][2].add(member, pair.other.name, other.known, why)
     return [_series(*each) for each in collected.values()]
 
@@ -203,15 +205,14 @@ def _series(test: AnalysedTest, finding: Finding, collected: Collected) -> Serie
     )
 
 
-def _twin(
-    seen: dict[tuple[str, tuple[str, ...]], Member], member: Member, test: str, of: str
-) -> Member | None:
-    """Earlier run with the same simulated trials of a test, seeds included; None without one."""
-    prints = member.identical.get(test, ())
-    if not prints:
-        return None
-    first = seen.setdefault((of, prints), member)
-    return first if first is not member else None
+def why_twin(seen: Seen, member: Member, prints: tuple[str, ...], test: str = "") -> str:
+    """Reason why a run is no new one: an earlier one has the same simulated trials; else "".
+
+    prints: fingerprints of its simulated trials of a test, seeds included. The run is added to
+    `seen`.
+    """
+    first = seen.setdefault((test, prints), member) if prints else member
+    return "" if first is member else f"{TWIN} {first.name}"
 
 
 def _own_errors(found: Sequence[Estimate]) -> Array:

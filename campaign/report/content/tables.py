@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from urllib.parse import quote
 
-from campaign.axis_kind import in_axis_terms
+from campaign.api.estimate_text import of_unknown_size
 from campaign.estimate import Estimate, Origin
 from campaign.reason import NONE
 from campaign.result import Cell, Column, Table, Value, bare, is_number
@@ -194,11 +194,8 @@ def remarks(table: Table) -> Iterator[str]:
             "Numbers with five digits and no interval: it is narrower than the last digit; the CSV "
             "file has it."
         )
-    sources = dict.fromkeys(
-        source for column in table.columns for source in _of_unknown_size(table, column)
-    )
-    if sources:
-        yield f"Not included in the intervals (size unknown): {', '.join(sources)}."
+    cells = (cell for column in table.columns for cell in _numbers(table, column))
+    yield from of_unknown_size(cell for cell in cells if isinstance(cell, Estimate))
 
 
 def _by_reason(
@@ -259,24 +256,17 @@ def _numbers(table: Table, column: Column) -> list[Estimate | float | int]:
     return [cell for _, cell in _placed(table, column)]
 
 
-def _open(cell: Estimate | float | int) -> bool:
-    return isinstance(cell, Estimate) and cell.origin is Origin.NOT_DETERMINED
-
-
-def _given(cell: Estimate) -> bool:
-    """Whether a number was set: it is exact and needs no interval."""
-    return cell.origin is Origin.GIVEN
-
-
 def _without_interval(cell: Estimate | float | int, column: Column) -> Sequence[str]:
-    if isinstance(cell, Estimate) and (cell.has_interval or _open(cell) or _given(cell)):
+    # A given number is exact and needs no interval.
+    without = (Origin.NOT_DETERMINED, Origin.GIVEN)
+    if isinstance(cell, Estimate) and (cell.has_interval or cell.origin in without):
         return ()
     reason = (cell.reason if isinstance(cell, Estimate) else NONE) or column.reason
     return (str(reason),) if reason else ()
 
 
 def _not_determined(cell: Estimate | float | int, column: Column) -> Sequence[str]:
-    if not isinstance(cell, Estimate) or not _open(cell):
+    if not isinstance(cell, Estimate) or cell.origin is not Origin.NOT_DETERMINED:
         return ()
     reason = cell.reason or column.reason
     return (str(reason),) if reason else ()
@@ -286,15 +276,6 @@ def _contradicted(cell: Estimate | float | int, column: Column) -> Sequence[str]
     if isinstance(cell, Estimate) and cell.origin is Origin.CONTRADICTED:
         return (str(cell.reason),)
     return ()
-
-
-def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
-    """Systematic parts of unknown size, which the intervals of a column do not include."""
-    for cell in _numbers(table, column):
-        if isinstance(cell, Estimate) and cell.has_interval:
-            yield from (
-                in_axis_terms(p.source) for p in cell.systematic if p.standard_uncertainty is None
-            )
 
 
 def data_link(text: str) -> str:
