@@ -114,6 +114,11 @@ class Estimate:
         return self.low is not None or self.high is not None
 
     @property
+    def is_bound(self) -> bool:
+        """Whether the number only limits the true value, on one side."""
+        return self.kind in ("at least", "at most")
+
+    @property
     def is_determined(self) -> bool:
         """Whether the value is finite and determined."""
         return math.isfinite(self.value) and self.origin is not Origin.NOT_DETERMINED
@@ -121,7 +126,7 @@ class Estimate:
     @property
     def says_enough(self) -> bool:
         """Whether there is an interval, a bound, or a reason for neither."""
-        return self.has_interval or self.kind in ("at least", "at most") or bool(self.reason)
+        return self.has_interval or self.is_bound or bool(self.reason)
 
     @property
     def systematic_uncertainty(self) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,11 @@ NOTHING = 1e-9
 """Absolute tolerance for equal numbers of a condition (SI): 1e-17 rad equals 0."""
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a number; True and False are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def same_value(one: Value, other: Value) -> bool:
     """Whether two values of a condition are equal: numbers within `TOLERANCE`, words exactly."""
     if isinstance(one, bool) or isinstance(other, bool):
@@ -41,6 +46,11 @@ def same_value(one: Value, other: Value) -> bool:
     if isinstance(one, int | float) and isinstance(other, int | float):
         return math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=NOTHING)
     return str(one) == str(other)
+
+
+def meets(stated: Mapping[str, Value], wanted: Mapping[str, Value]) -> bool:
+    """Whether the stated conditions include each of the wanted ones, with the same value."""
+    return all(name in stated and same_value(stated[name], value) for name, value in wanted.items())
 
 
 @dataclass(frozen=True)
@@ -139,6 +149,11 @@ class Column:
     decimals: int = 0
     file_only: bool = False
 
+    @property
+    def shown_unit(self) -> str:
+        """Unit of the page."""
+        return self.display or self.unit
+
 
 @dataclass(frozen=True)
 class Table:
@@ -173,6 +188,11 @@ class Axis:
     scale: Literal["linear", "log"] = "linear"
     limits: tuple[float, float] | None = None
     places: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit of the page."""
+        return self.display or self.unit
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import difflib
+import io
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -86,6 +88,23 @@ def _to(value: float, place: int, power: int) -> str:
     return minus(text if float(text) else text.removeprefix("-"))
 
 
+def csv_text(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """CSV text with every digit of a float, `true` or `false`, and an empty cell for None."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(headers)
+    writer.writerows([_exact(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _exact(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
 def percent(value: float | None) -> str:
     """Text of a deviation in %: signed; 2 decimals below 1 %, 1 below 100 %, else none."""
     if value is None or not math.isfinite(value):
@@ -131,6 +150,11 @@ def of_trials(numbers: Iterable[int]) -> str:
     """`Trial 3`, `Trials 1 to 160`; empty for none."""
     numbers = tuple(numbers)
     return f"Trial{'s' if len(set(numbers)) > 1 else ''} {in_rows(numbers)}" if numbers else ""
+
+
+def capitalized(text: str) -> str:
+    """The text with a capital first letter; all other letters are unchanged."""
+    return text[:1].upper() + text[1:]
 
 
 def count(number: int, one: str, many: str = "") -> str:

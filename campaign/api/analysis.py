@@ -86,10 +86,7 @@ class AnalysedTest:
     @property
     def lacks_result(self) -> bool:
         """Whether measurements completed, but the analysis has no result."""
-        done = any(
-            each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
-            for each in self.trials
-        )
+        done = any(each.is_completed_measurement for each in self.trials)
         kind = self.experiment
         measures = kind is not None and (kind.measure is not None or bool(kind.model.name))
         wanted = measures or bool(self.result.left_out)

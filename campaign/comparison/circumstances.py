@@ -9,8 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import ValidationError
-
 from campaign.api.analysis import AnalysedTest
 from campaign.api.quantity_words import option_quantity, plain
 from campaign.archive import RunReader
@@ -20,8 +18,6 @@ from campaign.physics.bench_knowledge import number_at
 from campaign.physics.truth import simulated
 from campaign.trial import Tree, canonical_json
 
-UNTOLD = frozenset({"bench", "name", "title", "description", "limits", "loops", "trials", "chosen"})
-"""Keys of a protocol's test that are reported elsewhere or follow from others."""
 NOT_MOVING = ("description", "known")
 """Tables of a bench that do not affect the motion; `known` is reported separately."""
 NONE = "–"
@@ -134,11 +130,10 @@ def _true(test: AnalysedTest, plants: Mapping[str, Tree]) -> Bench | None:
     """Simulated bench of a test; None if the archive does not have it."""
     if test.bench is None:
         return None
-    digests = dict.fromkeys(archived.trial.truth for archived in test.trials)
-    first = next(iter(digests), "")
+    first = test.trials[0].trial.truth if test.trials else ""
     try:
         return simulated(plants[first], test.bench) if first else test.bench
-    except (LookupError, ValidationError, ValueError):
+    except (LookupError, ValueError):
         return None
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from campaign.api.analysis import AnalysedTest
 from campaign.comparison.same_quantity import Pairing
+from campaign.text import count
 from campaign.trial import Role, Trial
 
 SIMULATION = "simulation"
@@ -23,15 +24,13 @@ def common_draws(pairing: Pairing) -> Iterator[str]:
             others += _measured(tested.other)
     identical = _common([t.fingerprint for t in own], [t.fingerprint for t in others])
     if identical:
-        are = "trial is" if len(others) == 1 else "trials are"
-        yield (
-            f"{identical} of {len(others)} {are} identical, to the seed: equal numbers say nothing."
-        )
+        trials = count(len(others), "trial is", "trials are")
+        yield f"{identical} of {trials} identical, to the seed: equal numbers say nothing."
     seeds = _common([t.seed for t in own], [t.seed for t in others]) - identical
     if seeds > 0:
-        have = "trial has" if len(others) == 1 else "trials have"
+        trials = count(len(others), "trial has", "trials have")
         yield (
-            f"{seeds} of {len(others)} {have} the seed in common, and so their random draws,"
+            f"{seeds} of {trials} the seed in common, and so their random draws,"
             " but not all of bench and task. They are judged as independent runs. As far as the"
             " draws act alike in both, intervals are too wide and may hide a difference. Another"
             " seed in one of the protocols makes them independent."

@@ -12,7 +12,6 @@ from campaign.comparison.draws import SIMULATION
 from campaign.comparison.not_judged import DERIVED, FOLLOWS, doubt
 from campaign.comparison.same_quantity import PairedTest
 from campaign.estimate import Origin
-from campaign.estimation.difference import BOUNDS
 from campaign.references.verdict import JudgedNumber
 
 
@@ -37,9 +36,7 @@ class Pair(JudgedNumber):
             and self.quantity not in DERIVED
             and not math.isnan(self.found.difference.value)
             and all(
-                each.kind not in BOUNDS
-                and not each.has_interval
-                and each.origin is not Origin.GIVEN
+                not each.is_bound and not each.has_interval and each.origin is not Origin.GIVEN
                 for each in (self.reference, self.other)
             )
         )

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from campaign.api.analysis import AnalysedTest
 from campaign.reason import NONE, Cause, Reason
-from campaign.recording import Outcome
 from campaign.result import Finding, same_value
-from campaign.trial import Role
 
 DERIVED = frozenset({"error_reduction", "error_decrease", "error_growth", "load_share"})
 """Quantities that are functions of other numbers of the same test."""
@@ -30,8 +28,6 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
 
     sides, findings: of the reference and of the other run.
     """
-    if findings[0].quantity in DERIVED:
-        return FOLLOWS()
     names = ("the reference", "the other")
     own = list(zip(names, sides, findings, strict=True))
     alone = [name for name, test, finding in own if trials_behind(test, finding) == 1]
@@ -43,8 +39,7 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
 def trials_behind(test: AnalysedTest, finding: Finding) -> int:
     """Count of trials that the finding may use: those that its conditions do not exclude."""
     return sum(
-        archived.ending.outcome is Outcome.COMPLETED
-        and archived.trial.role is Role.MEASUREMENT
+        archived.is_completed_measurement
         and all(
             same_value(finding.conditions[path], value)  # type: ignore[arg-type]
             for path, value in archived.trial.point.items()

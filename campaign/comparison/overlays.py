@@ -3,30 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import takewhile
 
 from campaign.api.analysis import AnalysedTest
-from campaign.report.palette import OTHERS, Look
+from campaign.report.palette import OTHERS
 from campaign.result import Curve, Figure, Panel
 
 PARTS = 8
 """Most panels of an overlay."""
 SAMPLES = 20_000
 """Samples above which a figure shows recordings and is not overlaid."""
-
-
-@dataclass(frozen=True)
-class Letters:
-    """Letters of the two runs in a picture."""
-
-    reference: str
-    other: str
-
-    @property
-    def looks(self) -> tuple[Look, Look]:
-        """Looks of the reference and the other: the first two that no series reserves."""
-        return OTHERS[0], OTHERS[1]
+LOOKS = OTHERS[:2]
+"""Looks of the reference and the other run: the first two that no series reserves."""
+Letters = tuple[str, str]
+"""Letters of the reference and of the other run."""
 
 
 def overlays(
@@ -57,7 +48,7 @@ def _overlay(one: Figure, other: Figure, letters: Letters) -> Figure | str:
     if len(panels) > PARTS:
         return f"“{one.title}” has too many curves to be laid over each other."
     across = one.across if len(panels) == len(one.panels) else 2
-    caption = f"{letters.reference} and {letters.other} over each other."
+    caption = f"{' and '.join(letters)} over each other."
     if one.caption == other.caption:  # else it is of one run
         caption = f"{caption} {one.caption}"
     return replace(one, panels=tuple(panels), caption=caption, thesis=(), trials=(), across=across)
@@ -67,7 +58,7 @@ def _both(one: Panel, other: Panel, letters: Letters, title: str | None = None) 
     """One panel with the curves of both, each run in its own look."""
     curves = tuple(
         _renamed(curve, letter)
-        for letter, panel in ((letters.reference, one), (letters.other, other))
+        for letter, panel in zip(letters, (one, other), strict=True)
         for curve in panel.curves
     )
     heading = _common(one.title, other.title) if title is None else title

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from campaign.axis_kind import in_axis_terms
 from campaign.comparison.finding_pairs import Pair
-from campaign.comparison.overlays import Letters, overlays
+from campaign.comparison.overlays import LOOKS, Letters, overlays
 from campaign.comparison.pictures import draw_side_by_side, with_names
 from campaign.comparison.run_comparison import Against, Comparison, Side
 from campaign.comparison.same_quantity import PairedTest
@@ -67,7 +67,6 @@ def article_of(comparison: Comparison) -> Article:
     damage = [damage_text(each.letter, each.damaged) for each in comparison.sides if each.damaged]
     others = "; each of the others is compared with it" if several else ""
     return Article(
-        name=NAME,
         kind="Comparison",
         command=shlex.join(["campaign", "compare", *(s.run.name for s in comparison.sides)]),
         title=comparison.title,
@@ -118,17 +117,16 @@ def _how(comparison: Comparison) -> Iterator[str]:
 def _against(
     against: Against, comparison: Comparison, making: PageParts, *, several: bool
 ) -> Iterator[Part]:
-    letters = Letters(against.reference.letter, against.other.letter)
-    both = (letters.reference, letters.other)
-    named = f"{letters.reference} and {letters.other}"
-    other = letters.other.lower()
+    letters = (against.reference.letter, against.other.letter)
+    named = " and ".join(letters)
+    other = letters[1].lower()
     prefix = f"{other}-" if several else ""
     folder = making.folder
     picture = making.attempt(
         "the picture of all changes",
         lambda: changes_figure(with_names(against.pairs), folder, f"{prefix}changes"),
     )
-    table = pair_table("pairs", "All pairs", against.pairs, both)
+    table = pair_table("pairs", "All pairs", against.pairs, letters)
     download = folder.table(table_csv(shorter(table, "finding")), f"{prefix}pairs")
     yield Part(
         f"against-{other}",
@@ -142,7 +140,7 @@ def _against(
         contents=named,
     )
     yield from _tests(against, letters, prefix, making)
-    alone, changed = alone_table(against), changes_table(against.changes, both)
+    alone, changed = alone_table(against), changes_table(against.changes, letters)
     circumstances = folder.shown_table(changed, (), f"{prefix}circumstances")
     yield Part(
         f"besides-{other}",
@@ -173,9 +171,9 @@ def _tests(against: Against, letters: Letters, prefix: str, making: PageParts) -
             continue
         title = tested.reference.title
         if tested.other.name != tested.reference.name:
-            title += f" ({letters.other}: {tested.other.title})"
+            title += f" ({letters[1]}: {tested.other.title})"
         pieces = tuple(_test(tested, pairs, against, letters, prefix, making))
-        yield Part(f"{letters.other.lower()}-test-{place}", title, pieces, role="test")
+        yield Part(f"{letters[1].lower()}-test-{place}", title, pieces, role="test")
 
 
 def _test(
@@ -191,11 +189,10 @@ def _test(
     judged = [pair for pair in pairs if pair.verdict is not Verdict.NOT_JUDGED]
     judged.sort(key=lambda pair: order.index(pair.verdict))
     rest = [pair for pair in pairs if pair.verdict is Verdict.NOT_JUDGED]
-    both = (letters.reference, letters.other)
-    table = shorter(pair_table("judged", "Found in both runs", judged, both), *UNTOLD, "reason")
+    table = shorter(pair_table("judged", "Found in both runs", judged, letters), *UNTOLD, "reason")
     if table.rows:
         yield folder.shown_table(table, (), f"{name}-judged")
-    table = shorter(pair_table("not-judged", "Not judged", rest, both), *UNTOLD, "verdict")
+    table = shorter(pair_table("not-judged", "Not judged", rest, letters), *UNTOLD, "verdict")
     if table.rows:
         why = Items(tuple(not_judged(rest)))
         shown = folder.shown_table(table, (), f"{name}-not-judged")
@@ -222,7 +219,7 @@ def _figures(
     ]
     notes = []
     # A run has one look in all pictures of the page.
-    chosen = dict(zip((letters.reference, letters.other), letters.looks, strict=True))
+    chosen = dict(zip(letters, LOOKS, strict=True))
     for each in overlays(tested.reference, tested.other, letters):
         if isinstance(each, str):
             notes.append(each)
@@ -240,7 +237,7 @@ def _side_by_side(
     words = "; ".join(f"{pair.quantity}: {change_of(pair)}" for pair in pairs[:12])
     return folder.picture(
         DrawingFiles.of(svg),
-        f"Numbers of {letters.reference} and {letters.other} side by side",
+        f"Numbers of {' and '.join(letters)} side by side",
         "With their 95 % intervals; what was declared different is in bold.",
         f"Changes: {words}.",
         f"{name}-side-by-side",

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 from campaign.api.quantity_words import axis_quantity_name, condition_words
 from campaign.comparison.finding_pairs import Pair
-from campaign.comparison.overlays import Letters
+from campaign.comparison.overlays import LOOKS, Letters
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
 from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
 from campaign.report.drawing.changes_picture import MOST, PITCH, name_row
 from campaign.report.drawing.rows import set_rows
 from campaign.report.palette import MUTED, Look
-from campaign.text import pretty_unit
+from campaign.text import capitalized, pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,16 +62,14 @@ def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
     common = {n: v for n, v in first.conditions.items() if n not in _varied(pairs)}
     at = condition_words(first.test, common)
     if at:
-        ax.set_title(at[0].upper() + at[1:], fontsize=7.5, weight="normal", color=MUTED.light)
+        ax.set_title(capitalized(at), fontsize=7.5, weight="normal", color=MUTED.light)
     for row, pair in enumerate(pairs):
-        own = zip((pair.reference, pair.other), letters.looks, (-0.16, 0.16), "ro", strict=True)
-        for estimate, look, shift, whose in own:
-            letter = letters.reference if whose == "r" else letters.other
+        own = zip((pair.reference, pair.other), LOOKS, (-0.16, 0.16), letters, strict=True)
+        for estimate, look, shift, letter in own:
             _draw_number(ax, in_unit(estimate, unit), look, row + shift, letter if not row else "")
         name_row(ax, row, names[row], pair)
     set_rows(ax, (len(pairs) - 0.4, -0.6), len(pairs) - 1)
-    words = axis_quantity_name(first.test, first.quantity)
-    label = words[:1].upper() + words[1:]
+    label = capitalized(axis_quantity_name(first.test, first.quantity))
     ax.set_xlabel(f"{label} ({pretty_unit(unit)})" if unit else label)
 
 

@@ -17,6 +17,7 @@ from campaign.comparison.shared_systematics import shared_sources, source_called
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment
+from campaign.experiments.shared.captions import listed
 from campaign.experiments.shared.systematic import SOURCES
 from campaign.references.verdict import Verdict, with_verdicts
 
@@ -102,18 +103,12 @@ class Comparison:
         titles = [side.title for side in self.sides]
         names = [side.run.header.name for side in self.sides]
         reference, *others = titles if len(set(titles)) == len(titles) else names
-        compared = " and ".join(filter(None, (", ".join(others[:-1]), others[-1])))
-        return f"{compared} compared with {reference}"
+        return f"{listed(others)} compared with {reference}"
 
     @property
     def tested(self) -> int:
         """Size of the family: all pairs of all runs that have a p value."""
         return sum(each.tested for each in self.against)
-
-    @property
-    def different(self) -> tuple[Pair, ...]:
-        """Pairs that are declared different."""
-        return tuple(pair for each in self.against for pair in each.of(Verdict.DIFFERENT))
 
 
 def _same(one: Estimate, other: Estimate) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from campaign.api.analysis import AnalysedTest
-from campaign.result import Finding, Value, same_value
+from campaign.result import Finding, Value, meets
 from campaign.units import same_dimension
 
 
@@ -80,10 +80,8 @@ def same_finding(one: Finding, other: Finding) -> bool:
     """Whether two findings have the same quantity and conditions, in units of one dimension."""
     if one.quantity != other.quantity or not same_dimension(one.unit, other.unit):
         return False
-    stated = [_stated(one.conditions), _stated(other.conditions)]
-    return stated[0].keys() == stated[1].keys() and all(
-        same_value(value, stated[1][name]) for name, value in stated[0].items()
-    )
+    wanted, stated = _stated(one.conditions), _stated(other.conditions)
+    return len(wanted) == len(stated) and meets(stated, wanted)
 
 
 def _candidates(

@@ -9,11 +9,12 @@ independent and add in squares.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 
 from campaign.api.analysis import AnalysedTest
 from campaign.axis_kind import Sides, in_axis_terms
 from campaign.experiments.shared.systematic import SOURCES
+from campaign.physics.bench import Bench
 from campaign.physics.bench_knowledge import number_at
 from campaign.physics.truth import value_at
 from campaign.trial import Tree, canonical_json
@@ -26,18 +27,23 @@ def shared_sources(
     one: AnalysedTest, other: AnalysedTest, plants: Plants, other_plants: Plants
 ) -> frozenset[str]:
     """Names of the sources of systematic parts that shift both tests' numbers equally."""
-    if not one.source or one.source != other.source:
-        return frozenset()
-    if one.bench is None or other.bench is None or one.bench.name != other.bench.name:
-        return frozenset()
-    shared = [
-        source
+    theirs = constants(other, other_plants)
+    own = constants(one, plants).items()
+    return frozenset(source for source, text in own if theirs.get(source) == text)
+
+
+def constants(test: AnalysedTest, plants: Plants) -> Mapping[str, str]:
+    """Constants of a test by the name of their systematic part; equal texts mean equal constants.
+
+    Empty for a test whose bench or source of samples is unknown.
+    """
+    if not test.source or test.bench is None:
+        return {}
+    return {
+        source: repr((test.source, test.bench.name, known, sorted(_true(test, path, plants))))
         for path, source in SOURCES.items()
-        if _known(one, path) is not None
-        and _known(one, path) == _known(other, path)
-        and _true(one, path, plants) == _true(other, path, other_plants)
-    ]
-    return frozenset(shared)
+        if (known := _known(test.bench, path)) is not None
+    }
 
 
 def source_called(name: str, sources: Iterable[str], sides: Sides) -> str | None:
@@ -45,20 +51,16 @@ def source_called(name: str, sources: Iterable[str], sides: Sides) -> str | None
     return next((each for each in sources if name in (each, in_axis_terms(each, sides))), None)
 
 
-def _known(test: AnalysedTest, path: str) -> tuple[object, object] | None:
+def _known(bench: Bench, path: str) -> tuple[object, object] | None:
     """Value of the bench at a path, and its entry in `known.values`; None without a value."""
-    if test.bench is None or (value := number_at(test.bench, path)) is None:
-        return None
-    return value[0], test.bench.known.values.get(path)
+    value = number_at(bench, path)
+    return None if value is None else (value[0], bench.known.values.get(path))
 
 
 def _true(test: AnalysedTest, path: str, plants: Plants) -> frozenset[str]:
     """Simulated values at a path; empty if the stated bench was simulated."""
-    return frozenset(_at(plants.get(digest), path) for digest in _truths(test))
-
-
-def _truths(test: AnalysedTest) -> Iterator[str]:
-    return (archived.trial.truth for archived in test.trials if archived.trial.truth)
+    truths = (archived.trial.truth for archived in test.trials if archived.trial.truth)
+    return frozenset(_at(plants.get(digest), path) for digest in truths)
 
 
 def _at(plant: Tree | None, path: str) -> str:
@@ -66,17 +68,3 @@ def _at(plant: Tree | None, path: str) -> str:
         return canonical_json(value_at(plant, tuple(path.split("."))))
     except (LookupError, TypeError):
         return "unknown"
-
-
-def constants(test: AnalysedTest, plants: Plants) -> Mapping[str, str]:
-    """Constants of a test by the name of their systematic part; equal texts mean equal constants.
-
-    The conditions are those of `shared_sources`, for more than two runs.
-    """
-    if not test.source or test.bench is None:
-        return {}
-    return {
-        source: repr((test.source, test.bench.name, known, sorted(_true(test, path, plants))))
-        for path, source in SOURCES.items()
-        if (known := _known(test, path)) is not None
-    }

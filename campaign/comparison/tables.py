@@ -14,15 +14,14 @@ from campaign.comparison.draws import common_draws
 from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.run_comparison import Against, size_of
 from campaign.estimate import Estimate
-from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.estimation.difference import in_unit
+from campaign.reason import Reason
 from campaign.references.verdict import Verdict
 from campaign.result import Cell, Column, Finding, Table
-from campaign.text import interval, pretty_unit
+from campaign.text import count, interval, pretty_unit
 
 
-def pair_table(
-    key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str], note: str = ""
-) -> Table:
+def pair_table(key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str]) -> Table:
     """Table with one row per pair, each in its own unit."""
     reference, other = letters
     return Table(
@@ -43,7 +42,6 @@ def pair_table(
             Column("reason", "Why not judged"),
         ),
         tuple(_row(pair) for pair in pairs),
-        note=note,
     )
 
 
@@ -101,10 +99,13 @@ def changes_table(changes: Sequence[Change], letters: tuple[str, str]) -> Table:
 
 
 def not_judged(pairs: Iterable[Pair]) -> Iterator[str]:
-    """Reasons for no verdict with their counts, as `12: ...`, the most frequent first."""
-    counts = Counter(str(pair.reason) for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
-    for reason, count in counts.most_common():
-        yield f"{count}: {reason}"
+    """Reasons for no verdict with their counts (`counted`)."""
+    return counted(pair.reason for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
+
+
+def counted(reasons: Iterable[Reason]) -> Iterator[str]:
+    """Reasons with their counts, as `12: ...`, the most frequent first."""
+    return (f"{count}: {text}" for text, count in Counter(map(str, reasons)).most_common())
 
 
 def name_of(pair: Pair) -> str:
@@ -118,7 +119,7 @@ def number_of(estimate: Estimate, unit: str) -> str:
     """Text of an estimate in a unit, without the unit."""
     shown = in_unit(estimate, unit)
     low, high = shown.combined
-    if shown.kind in ("at least", "at most"):
+    if shown.is_bound:
         sign, end = ("≥", low) if shown.kind == "at least" else ("≤", high)
         return f"{sign} {interval(end, None, None)}"
     return interval(shown.value, low, high)
@@ -133,7 +134,7 @@ def change_of(pair: Pair) -> str:
     value, low, high = (
         None if end is None else 100 * end for end in (change.value, *change.combined)
     )
-    if change.kind in ("at least", "at most"):
+    if change.is_bound:
         return f"{number_of(change, 'percent')} %"
     if math.isnan(change.value):
         return _difference_of(pair)
@@ -149,7 +150,7 @@ def _difference_of(pair: Pair) -> str:
     text = number_of(difference, pair.display)
     if math.isnan(difference.value) or text == "–":
         return "–"
-    sign = "+" if difference.value > 0 and difference.kind not in BOUNDS else ""
+    sign = "+" if difference.value > 0 and not difference.is_bound else ""
     return f"{sign}{text} {pretty_unit(pair.display)}".rstrip()
 
 
@@ -168,17 +169,14 @@ def sentences(against: Against, tested: int) -> Iterator[str]:
     yield from common_draws(against.pairing)
     if against.equal:
         return
-    several = len(pairs) != 1
-    yield (
-        f"{len(pairs)} number{'s are' if several else ' is'} found in both runs,"
-        f" {judged} of which can be tested."
-    )
+    found = count(len(pairs), "number is", "numbers are")
+    yield f"{found} found in both runs, {judged} of which can be tested."
     different = len(against.of(Verdict.DIFFERENT))
     if different:
-        are = "is" if different == 1 else "are"
+        numbers = count(different, "is", "are")
         yield (
-            f"{different} {are} declared different: at most 5 % of what is declared so is expected"
-            f" to be false (Benjamini and Hochberg over {tested} tests)."
+            f"{numbers} declared different: at most 5 % of what is declared so is expected to be"
+            f" false (Benjamini and Hochberg over {tested} tests)."
         )
     elif judged:
         yield (
@@ -187,14 +185,13 @@ def sentences(against: Against, tested: int) -> Iterator[str]:
         )
     bounds = len(against.of(Verdict.BEYOND_BOUND))
     if bounds:
-        lie = "lies" if bounds == 1 else "lie"
-        yield f"{bounds} more {lie} beyond a bound; no test is made of that."
+        yield f"{count(bounds, 'more lies', 'more lie')} beyond a bound; no test is made of that."
     bare = against.without_interval
     if bare:
         equal = len(bare) - len(bare_differing(against))
         yield (
-            f"Of {len(bare)} simulated without an interval {equal}"
-            f" {'is' if equal == 1 else 'are'} equal to the last digit."
+            f"Of {len(bare)} simulated without an interval {count(equal, 'is', 'are')} equal to the"
+            " last digit."
         )
 
 

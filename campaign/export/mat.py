@@ -18,6 +18,7 @@ from campaign.archive.reading.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind
 from campaign.recording import Recording
+from campaign.result import is_number
 from campaign.trial import canonical_json
 
 LARGEST = 2**31 - 1
@@ -93,7 +94,7 @@ def _struct(tree: Mapping[str, Any]) -> dict[str, Any]:
     """Struct of swept values: numbers, booleans and text unchanged, anything else as JSON."""
     plain = [
         float(value)
-        if isinstance(value, int | float) and not isinstance(value, bool)
+        if is_number(value)
         else value
         if isinstance(value, bool)
         else _ascii(value if isinstance(value, str) else canonical_json(value))

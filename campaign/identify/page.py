@@ -87,7 +87,6 @@ def article_of(found: Identification, command: str, bench: str = "") -> Article:
         *([("Bench file", bench)] if bench else []),
     )
     return Article(
-        name=NAME,
         kind="Identification",
         command=command,
         title=f"{found.bench.name}, {found.bench.axis.name}",

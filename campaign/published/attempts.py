@@ -7,10 +7,9 @@ failed trial does not affect the cells of other sweep points.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from campaign.published.provenance import SweepPoint
-from campaign.result import Value, same_value
+from campaign.result import Value, is_number, same_value
 
 COMPENSATION = "compensation"
 
@@ -37,9 +36,9 @@ def in_vain(places: Sequence[SweepPoint], conditions: Mapping[str, Value]) -> bo
 
 
 def _other_number(place: SweepPoint, conditions: Mapping[str, Value]) -> bool:
-    numbers = {k: v for k, v in {**place.numbers, **place.point}.items() if _is_number(v)}
+    numbers = {k: v for k, v in {**place.numbers, **place.point}.items() if is_number(v)}
     return any(
-        _is_number(conditions[name]) and not same_value(numbers[name], conditions[name])
+        is_number(conditions[name]) and not same_value(numbers[name], conditions[name])
         for name in numbers.keys() & conditions.keys()
     )
 
@@ -55,7 +54,3 @@ def _words(places: Sequence[SweepPoint]) -> dict[str, set[str]]:
         for name, word in _words_of(place).items():
             words.setdefault(name, set()).add(word)
     return words
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -9,16 +9,15 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import PurePosixPath
 
 from pydantic import Field, ValidationError
 
 from campaign.options import Options
+from campaign.published.draws import student
 
 FOLDER = "calibration"
 """Folder beside a bench file; its file of the same name is the result of the calibration."""
-LEVEL = 0.95
 
 
 class PropagationTable(Options):
@@ -49,16 +48,10 @@ class CalibrationPart:
     freedom: int = 1
     lost: frozenset[str] = frozenset()
 
-    @cached_property
-    def _student(self) -> float:
-        from scipy.special import stdtrit
-
-        return float(stdtrit(self.freedom, 0.5 + 0.5 * LEVEL))
-
     def half_width(self, path: str) -> float | None:
         """Half-width of the cell's 95 % interval (Student's t), printed unit; None if unknown."""
         sigma = self.standard_uncertainty.get(path)
-        return None if sigma is None else self._student * sigma
+        return None if sigma is None else student(self.freedom) * sigma
 
 
 NOTHING = CalibrationPart()

@@ -58,7 +58,7 @@ def together(findings: Sequence[Finding], seeds: Collection[Value] = ()) -> Find
     ]
     usable = [
         math.isfinite(each.value)
-        and each.known.kind not in ("at least", "at most")
+        and not each.known.is_bound
         and each.known.origin is not Origin.NOT_DETERMINED
         for each in findings
     ]
@@ -97,7 +97,7 @@ def spread(
         low, high = draws[outermost - 1], draws[-outermost]
         how = "order statistics"
     else:
-        half = _student(count - 1) * stdev(draws) * math.sqrt(1.0 + 1.0 / count)
+        half = student(count - 1) * stdev(draws) * math.sqrt(1.0 + 1.0 / count)
         low, high = fmean(draws) - half, fmean(draws) + half
         how = "Student's t, as if they were normal"
     return Estimate(
@@ -138,7 +138,8 @@ def place_in(values: Sequence[float], published: float, rounding: float = 0.0) -
     )
 
 
-def _student(freedom: int) -> float:
+def student(freedom: int) -> float:
+    """Quantile of Student's t for the half-width of a 95 % interval."""
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, 0.5 + 0.5 * LEVEL))

@@ -10,7 +10,7 @@ from campaign.published.calibration_covariance import NOTHING, CalibrationPart
 from campaign.published.patterns import covers
 from campaign.published.provenance import NOTHING_ALTERED, Provenance
 from campaign.published.values import THESIS, Cell, Published, thesis
-from campaign.result import Finding, Value, same_value
+from campaign.result import Finding, Value, meets
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,4 @@ def with_cells(test: Evidence, published: Published) -> Evidence:
 def concerns(finding: Finding, cell: Cell, known: Mapping[str, Value]) -> bool:
     """Whether a finding has the cell's quantity and each of its conditions."""
     stated = {**known, **finding.conditions}
-    return finding.quantity == cell.quantity and all(
-        name in stated and same_value(stated[name], value)
-        for name, value in cell.conditions.items()
-    )
+    return finding.quantity == cell.quantity and meets(stated, cell.conditions)

@@ -112,8 +112,9 @@ def provenance_of(
         tree: Mapping[str, Any] = trial.bench
         if described is not None and perturbs_bench:
             tree = _at_point(described, trial.point)
-        if described is not None and len(drawn) > 1 and own in drawn:
-            tree = _with_seed(tree, own)  # several draws of its scatter are the same bench
+        scatters = isinstance(tree.get("variation"), Mapping)
+        if described is not None and len(drawn) > 1 and own in drawn and scatters:
+            tree = _replaced(tree, ["variation", "seed"], own)  # all its draws are one bench
         key = canonical_json([tree, compensation, trial.truth])
         if key not in known:
             why, described_at_all = _why(tree, compensation)
@@ -162,13 +163,6 @@ def _own_seed(described: Tree | None) -> int:
     variation = (described or {}).get("variation")
     seed = variation.get("seed") if isinstance(variation, Mapping) else None
     return seed if isinstance(seed, int) else 0
-
-
-def _with_seed(tree: Mapping[str, Any], seed: int) -> Mapping[str, Any]:
-    variation = tree.get("variation")
-    if not isinstance(variation, Mapping):
-        return tree
-    return {**tree, "variation": {**variation, "seed": seed}}
 
 
 def _replaced(tree: Mapping[str, Any], keys: list[str], value: Any) -> dict[str, Any]:

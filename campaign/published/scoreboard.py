@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -24,6 +22,7 @@ from campaign.published.verdicts import (
     reproduced,
 )
 from campaign.result import Finding, same_value
+from campaign.text import csv_text
 from campaign.trial import canonical_json
 
 COLUMNS = (
@@ -154,19 +153,8 @@ def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:
 
 def to_csv(lines: Iterable[Line], columns: Sequence[str] = COLUMNS) -> str:
     """CSV text of the lines with these `columns` of `Line.cells`, unrounded."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    for line in lines:
-        cells = line.cells
-        writer.writerow([_exact(cells[name]) for name in columns])
-    return text.getvalue()
-
-
-def _exact(value: str | float | None) -> str:
-    if isinstance(value, float):
-        return repr(float(value))
-    return "" if value is None else str(value)
+    rows = ([cells[name] for name in columns] for cells in (line.cells for line in lines))
+    return csv_text(columns, rows)
 
 
 def _unknown_tables(published: Published, evidence: Sequence[Evidence]) -> Iterator[str]:

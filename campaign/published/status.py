@@ -10,7 +10,6 @@ from campaign.published.patterns import covers, overlap
 from campaign.published.values import Cell
 from campaign.published.verdicts import rounds_to_print
 from campaign.result import Finding
-from campaign.units import convert
 
 
 class Status(StrEnum):
@@ -70,8 +69,5 @@ def _print_alike(cell: Cell, other: Cell) -> bool:
     named = (cell.conditions.keys() ^ other.conditions.keys()) - {"domain"}
     if named or cell.quantity != other.quantity:
         return False
-    try:
-        again = float(convert(other.value, other.unit, cell.unit))
-    except ValueError:
-        return False
-    return rounds_to_print(cell, again)
+    again = other.in_unit(cell.unit)
+    return again is not None and rounds_to_print(cell, again)

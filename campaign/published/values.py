@@ -20,7 +20,7 @@ from campaign.errors import UsageError
 from campaign.options import Options, spelled
 from campaign.published.patterns import covers
 from campaign.result import Value
-from campaign.units import to_si
+from campaign.units import convert, to_si
 
 T = TypeVar("T")
 THESIS = "thesis"
@@ -208,6 +208,13 @@ class Cell:
     def printed(self) -> str:
         """The number as the document prints it."""
         return f"{self.value:.15g}" if self.decimals is None else f"{self.value:.{self.decimals}f}"
+
+    def in_unit(self, unit: str) -> float | None:
+        """The number in another unit; None for a unit of another dimension."""
+        try:
+            return float(convert(self.value, self.unit, unit))
+        except ValueError:
+            return None
 
 
 def heading_of(table: str) -> str:

@@ -99,7 +99,7 @@ def reproduced(
     )
     if lost:
         return ReproducedNumber(value, None, None, known.kind, Origin.NOT_DETERMINED, LOST())
-    if known.kind in ("at least", "at most"):
+    if known.is_bound:
         return ReproducedNumber(value, low, high, known.kind, known.origin, known.reason)
     alone = calibration is not None and low is None and high is None
     if calibration is not None:

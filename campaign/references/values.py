@@ -16,10 +16,9 @@ from pathlib import Path
 
 from campaign.errors import UsageError
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.difference import in_unit
 from campaign.estimation.intervals import LEVEL
 from campaign.reason import Cause
-from campaign.result import Finding, Value, same_value
+from campaign.result import Finding, Value, meets
 from campaign.units import same_dimension, to_si
 
 NEEDED = ("quantity", "value", "unit")
@@ -54,15 +53,8 @@ class ReferenceValue:
             self.test in ("", test)
             and self.estimate.name == finding.quantity
             and same_dimension(self.estimate.unit, finding.unit)
-            and all(
-                name in finding.conditions and same_value(finding.conditions[name], value)
-                for name, value in self.conditions.items()
-            )
+            and meets(finding.conditions, self.conditions)
         )
-
-    def in_unit_of(self, finding: Finding) -> Estimate:
-        """The number in the unit of a matching finding."""
-        return in_unit(self.estimate, finding.unit)
 
 
 def read_values(path: Path) -> tuple[ReferenceValue, ...]:

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Any, Self, TypeVar
 
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.difference import BOUNDS, Difference, difference_of
+from campaign.estimation.difference import Difference, difference_of
 from campaign.estimation.family import RATE, adjusted
 from campaign.reason import NONE, Cause, Reason
 from campaign.result import Value
@@ -68,7 +68,7 @@ class JudgedNumber:
         Raises ValueError for incompatible units.
         """
         pair = difference_of(reference, other, shared)
-        beyond = pair.difference.kind in BOUNDS and excludes_zero(pair.difference)
+        beyond = pair.difference.is_bound and excludes_zero(pair.difference)
         return cls(
             reference=reference,
             other=other,

@@ -15,7 +15,7 @@ from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.report.content import lines
 from campaign.report.content.citation import citation_of
-from campaign.report.content.document import NO_FILES, Document, document_of
+from campaign.report.content.document import FAILED, NO_FILES, Document, document_of
 from campaign.report.content.references import Files
 from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.pdf import also_as_pdf, keeps_pdf
@@ -36,14 +36,8 @@ from campaign.report.palette import variables
 from campaign.report.previous_report import Formats, all_formats, made_before, remember
 from campaign.report.processes import Workers
 
-FAILED = 200
-"""Maximum number of listed failed trials; the archive has all."""
 DAMAGED = 200
 """Maximum number of listed damages on the page; `tables/damaged.csv` has all."""
-
-
-def _nothing(_: Document) -> None:
-    """Do nothing: default of `when_found`."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +76,7 @@ def build_report(
     trials: Sequence[int] = (),
     zoom: bool = False,
     command: str = "",
-    when_found: Callable[[Document], None] = _nothing,
+    when_found: Callable[[Document], None] = lambda _: None,
     references: Files = NO_FILES,
 ) -> Report:
     """Write `report.html`, `report.json`, `tables/` and `figures/` of `run` into `output`.
@@ -169,7 +163,7 @@ def render(
     at_work: Workers | None = None,
     zoom: bool = False,
     command: str = "",
-    when_found: Callable[[Document], None] = _nothing,
+    when_found: Callable[[Document], None] = lambda _: None,
     references: Files = NO_FILES,
 ) -> tuple[str, Folder, Report]:
     """Make the page's text, the other files and the report, without writing.

@@ -146,15 +146,3 @@ def variables() -> dict[str, tuple[str, str]]:
     """Colour on the light and on the dark page by CSS variable, sorted."""
     all_looks = (PAPER, INK, MUTED, HAIRLINE, *SERIES.values(), *OTHERS, *STATUS.values())
     return {look.name: (look.light, look.dark) for look in sorted(all_looks, key=lambda a: a.name)}
-
-
-def contrast(first: str, second: str) -> float:
-    """WCAG 2.1 contrast ratio of two `#rrggbb` colours, 1 to 21."""
-    low, high = sorted((_luminance(first), _luminance(second)))
-    return (high + 0.05) / (low + 0.05)
-
-
-def _luminance(colour: str) -> float:
-    channels = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

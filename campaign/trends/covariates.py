@@ -10,11 +10,10 @@ import numpy as np
 
 from campaign.channels import TEMPERATURE
 from campaign.errors import UsageError
-from campaign.text import pretty_unit
+from campaign.text import capitalized, pretty_unit
 from campaign.trends.members import Member
 from campaign.trends.series import Series
-from campaign.trial import Outcome, Role
-from campaign.units import split_quantity
+from campaign.units import factor, split_quantity
 
 TIME, ORDER = "time", "order"
 DAY = 86_400.0
@@ -110,8 +109,7 @@ def _measured_temperature(member: Member, test: str) -> float:
     """
     medians = []
     for each in (trial for one in member.tests for trial in one.trials):
-        trial, completed = each.trial, each.ending.outcome is Outcome.COMPLETED
-        if not completed or trial.role is not Role.MEASUREMENT or test not in ("", trial.test):
+        if not each.is_completed_measurement or test not in ("", each.trial.test):
             continue
         unit = next((c.unit for c in each.channels() if c.name == TEMPERATURE), None)
         if unit is None or each.not_kept:
@@ -147,8 +145,6 @@ def _tagged(member: Member, name: str) -> tuple[float, str] | None:
 
 
 def _tag(name: str, members: Sequence[Member]) -> Covariate:
-    from campaign.units import factor
-
     tags = {m.number: tag for m in members if (tag := _tagged(m, name)) is not None}
     unit = next(iter(tags.values()))[1]
     values: dict[int, float] = {}
@@ -162,7 +158,7 @@ def _tag(name: str, members: Sequence[Member]) -> Covariate:
             ) from None
     return Covariate(
         name,
-        name[:1].upper() + name[1:],
+        capitalized(name),
         unit,
         pretty_unit(unit) or f"unit of {name}",
         1.0,
@@ -209,7 +205,7 @@ def _of_series(one: Series) -> Covariate:
     shown = {p.member.number: one.scale * p.estimate.value for p in one.points}
     return Covariate(
         f"{one.test}: {one.name}",
-        one.name[:1].upper() + one.name[1:],
+        capitalized(one.name),
         one.display,
         pretty_unit(one.display) or "unit",
         1.0,

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.estimation.difference import in_unit
 from campaign.estimation.intervals import LEVEL
+from campaign.estimation.trends.changes import Trend
 from campaign.result import Axis, Curve, Figure, Mark, Panel
+from campaign.text import capitalized
 from campaign.trends.covariates import Covariate
 from campaign.trends.rig_trends import Trends, TrendSeries, Verdict
-
-Array = NDArray[np.float64]
 
 ALONG = 25
 """Points of a line and its band."""
@@ -28,7 +27,7 @@ def declared_figure(each: TrendSeries, trends: Trends, headline: str, place: int
     """Figure of one declared number."""
     return Figure(
         f"declared-{place}",
-        each.series.name[:1].upper() + each.series.name[1:],
+        capitalized(each.series.name),
         f"{headline}. Bars are 95 % intervals of each run alone"
         + ("; the band is that of the line." if each.verdict is not Verdict.JUMPED else
            "; lines are the levels before and behind."),
@@ -62,9 +61,9 @@ def _panel(each: TrendSeries, covariate: Covariate, *, small: bool) -> Panel:
     if each.verdict is Verdict.JUMPED:
         curves += _levels(each)
         marks = [_mark(each, jump.place) for jump in each.jumps]
-    elif each.change is not None and each.change.trend is not None:
-        curves.append(_line(each, "" if small else "trend"))
-    name, _, words = (series.name[:1].upper() + series.name[1:]).partition(", ")
+    elif each.trend is not None:
+        curves.append(_line(each, each.trend, "" if small else "trend"))
+    name, _, words = capitalized(series.name).partition(", ")
     title = f"{series.test}: {words}" if words else series.test
     title = title if len(title) <= TITLE else f"{title[: TITLE - 1]}…"
     return Panel(
@@ -80,9 +79,7 @@ def _short(covariate: Covariate) -> str:
     return "Time" if covariate.label.startswith("Time since") else covariate.label
 
 
-def _line(each: TrendSeries, label: str) -> Curve:
-    assert each.change is not None and each.change.trend is not None  # noqa: S101, PT018
-    trend = each.change.trend
+def _line(each: TrendSeries, trend: Trend, label: str) -> Curve:
     x = np.linspace(float(np.min(each.x)), float(np.max(each.x)), ALONG)
     own = each.series.scale
     known = [trend.at(float(at)) for at in x]

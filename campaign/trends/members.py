@@ -20,7 +20,6 @@ from campaign.comparison.same_quantity import pair_tests
 from campaign.comparison.shared_systematics import constants, source_called
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
-from campaign.trial import Outcome, Role
 
 LEAST = 3
 """Least number of runs; two can only be compared."""
@@ -199,8 +198,4 @@ def _member(number: int, run: RunReader, experiments: Mapping[str, Experiment]) 
 def _fingerprints(test: AnalysedTest) -> tuple[str, ...]:
     if test.source != SIMULATION:
         return ()
-    return tuple(
-        each.trial.fingerprint
-        for each in test.trials
-        if each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
-    )
+    return tuple(each.trial.fingerprint for each in test.trials if each.is_completed_measurement)

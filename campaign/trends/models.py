@@ -9,9 +9,9 @@ from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment, bench_of
 from campaign.identify.identification import Section, fitted_again, identify
 from campaign.identify.material import ChosenRun
+from campaign.parameter import Parameter
 from campaign.trends.members import Member
-from campaign.trends.series import TWIN, Point, Series, add_point, made
-from campaign.trial import Outcome, Role
+from campaign.trends.series import Collected, Seen, Series, why_twin
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ def fit_models(
 
 def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: str) -> TrendFit:
     first: Section | None = None
-    fits: dict[str, tuple[Section, list[Point], list[str]]] = {}
+    fits: dict[str, tuple[Parameter, Collected]] = {}
     problems: list[str] = []
-    seen: dict[tuple[str, ...], Member] = {}
+    seen: Seen = {}
     for member in members:
         why, section = _section(member, known, name, first)
         if section is None or section.result is None:
@@ -49,27 +49,24 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
             continue
         if first is None:
             first = section
-            fits = {p.estimate.name: (section, [], []) for p in section.identified.parameters}
+            fits = {
+                each.estimate.name: (each, Collected(each.estimate.unit))
+                for each in section.identified.parameters
+            }
         prints = tuple(text for own in member.identical.values() for text in own)
-        twin = seen.setdefault(prints, member) if prints else member
-        same = "" if twin is member else f"{TWIN} {twin.name}"
+        same = why_twin(seen, member, prints)
         for parameter in section.identified.parameters:
             if parameter.estimate.name in fits:
-                _, points, left_out = fits[parameter.estimate.name]
-                estimate = parameter.estimate
-                add_point(points, left_out, member, "", estimate, _unit(fits, estimate.name), same)
+                fits[parameter.estimate.name][1].add(member, "", parameter.estimate, same)
     series = tuple(
-        made(
-            points,
-            left_out,
+        collected.series(
             test=name,
             title=known[name].model.summary,
             quantity=each,
             name=each.replace("_", " "),
-            unit=_unit(fits, each),
-            display=_display(section, each),
+            display=parameter.display or parameter.estimate.unit,
         )
-        for each, (section, points, left_out) in fits.items()
+        for each, (parameter, collected) in fits.items()
     )
     return TrendFit(name, series, tuple(problems))
 
@@ -78,11 +75,7 @@ def _section(
     member: Member, known: Mapping[str, Experiment], name: str, first: Section | None
 ) -> tuple[str, Section | None]:
     """Reason for no result, and a run's section; its structure is that of `first`, if any."""
-    trials = tuple(
-        each
-        for each in member.run.trials
-        if each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
-    )
+    trials = tuple(each for each in member.run.trials if each.is_completed_measurement)
     if not trials:
         return "no trial was completed", None
     chosen = ChosenRun(member.run, "", trials)
@@ -94,13 +87,3 @@ def _section(
     except UsageError as error:
         return str(error), None
     return section.problem, section
-
-
-def _unit(found: Mapping[str, tuple[Section, list[Point], list[str]]], name: str) -> str:
-    parameters = found[name][0].identified.parameters
-    return next(p.estimate.unit for p in parameters if p.estimate.name == name)
-
-
-def _display(section: Section, name: str) -> str:
-    own = next(p for p in section.identified.parameters if p.estimate.name == name)
-    return own.display or own.estimate.unit

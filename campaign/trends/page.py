@@ -19,6 +19,7 @@ from campaign.report.formats.interface import Format
 from campaign.report.page.article import Article, PageParts, Part, damage_text, problems_part
 from campaign.report.page.folder import Folder
 from campaign.report.page.pieces import Files, Items, Paragraph, Piece
+from campaign.text import capitalized
 from campaign.trends.figures import declared_figure, small_multiples
 from campaign.trends.rig_trends import WITHIN, Trends, TrendSeries, Verdict
 from campaign.trends.tables import (
@@ -64,7 +65,6 @@ def article_of(trends: Trends, command: str) -> Article:
     first, last = trends.members[0], trends.members[-1]
     header = first.run.header
     return Article(
-        name=NAME,
         kind="Trends",
         command=command,
         title=title_of(trends),
@@ -131,7 +131,7 @@ def _numbers(trends: Trends, folder: Folder) -> Iterator[Piece]:
     if why := tuple(not_judged(trends)):
         yield Paragraph("Not judged, and why:")
         yield Items(why)
-    every = followed_table("followed", "All numbers", trends.followed, trends.covariate)
+    every = followed_table(trends.followed, trends.covariate)
     files = (
         (
             "All numbers with all p values, scatter and notes:",
@@ -187,7 +187,7 @@ def _declared(
     """Headline of a declared number, and its pieces."""
     sentence = headline(each, trends)
     drawn = making.drawn(declared_figure(each, trends, sentence, place))
-    notes = (f"{note[:1].upper()}{note[1:]}." for note in each.notes if note != WITHIN)
+    notes = (f"{capitalized(note)}." for note in each.notes if note != WITHIN)
     beside = filter(None, (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps)))
     caution = f"; {WITHIN}" if WITHIN in each.notes else ""
     pieces: list[Piece] = [] if drawn is None else [drawn]
@@ -239,13 +239,12 @@ def _tree(each: TrendSeries, trends: Trends) -> dict[str, Any]:
     effects = effect(each, trends.covariate)
     if effects is None or each.change is None:
         return tree
-    adjusted = dict(each.adjusted or {})
     return tree | {
         "mean": row_of(each.mean),
         "trend": row_of(effects[0]),
         "trend_share": row_of(effects[1]),
         "p": each.p,
-        "adjusted": adjusted,
+        "adjusted": dict(each.adjusted or {}),
         "shape": each.change.shape,
         "detectable": {
             name: detectable(each, name, trends.covariate) for name in each.detectable or {}

@@ -19,7 +19,7 @@ from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.estimation.family import RATE, adjusted, level_of
 from campaign.estimation.intervals import LEVEL
-from campaign.estimation.trends.changes import Change, Jump, change, detectable, jumps_of
+from campaign.estimation.trends.changes import Change, Jump, Trend, change, detectable, jumps_of
 from campaign.estimation.trends.scatter import Mixture
 from campaign.experiments.interface import Experiment
 from campaign.reason import NONE, Cause, Reason
@@ -93,15 +93,20 @@ class TrendSeries:
     notes: tuple[str, ...] = ()
 
     @property
+    def trend(self) -> Trend | None:
+        """Line through the points; None if not judged."""
+        return None if self.change is None else self.change.trend
+
+    @property
+    def jump(self) -> Jump | None:
+        """Most likely jump, declared or not; None if there was no search for one."""
+        return None if self.change is None else self.change.jump
+
+    @property
     def p(self) -> dict[str, float]:
         """Unadjusted p values, by `trend` and `jump`."""
-        if self.change is None:
-            return {}
-        trend, jump = self.change.trend, self.change.jump
-        return {
-            **({} if trend is None else {TREND: trend.p}),
-            **({} if jump is None else {JUMP: jump.p}),
-        }
+        changes = {TREND: self.trend, JUMP: self.jump}
+        return {name: each.p for name, each in changes.items() if each is not None}
 
     @property
     def smallest(self) -> float:
@@ -111,9 +116,9 @@ class TrendSeries:
     @property
     def mean(self) -> Estimate:
         """Fitted value at the mean of `x`, in the display unit."""
-        if self.change is None or self.change.trend is None:
+        if self.trend is None:
             return Estimate.without_interval("mean", math.nan, self.series.display, self.reason)
-        known = self.change.trend.at(float(np.mean(self.x)))
+        known = self.trend.at(float(np.mean(self.x)))
         return self.estimate("mean", known, self.series.display)
 
     @property
@@ -272,9 +277,9 @@ def _with(
 
 def _within(each: TrendSeries) -> bool:
     """Whether the largest change is below the median half-width of the runs' intervals."""
-    if each.series.bare or each.change is None or each.change.trend is None:
+    if each.series.bare or each.trend is None:
         return False
-    slope = each.change.trend.slope.value
+    slope = each.trend.slope.value
     sizes = [abs(jump.size.value) for jump in each.jumps] or [abs(slope) * float(np.ptp(each.x))]
     halves = [point.estimate.half_width for point in each.series.points]
     return max(sizes) < float(np.median(halves))

@@ -11,6 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from campaign.comparison.not_judged import DERIVED, FOLLOWS
 from campaign.comparison.same_quantity import pair_tests
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.contrast import is_student
-from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.estimation.difference import in_unit
 from campaign.estimation.intervals import LEVEL, student
 from campaign.estimation.trends.own_errors import moderated
 from campaign.reason import NONE, Cause, Reason
@@ -33,6 +34,8 @@ from campaign.units import convert
 Array = NDArray[np.float64]
 
 TWIN = "the same simulation as"
+Seen = dict[tuple[str, tuple[str, ...]], Member]
+"""First run with simulated trials, by test and fingerprints."""
 TOO_FEW_RUNS = Cause("too few runs", "found in {runs} runs{lost}: three are the least")
 SAME_IN_ALL = Cause("same in all runs", "it is the same in all runs, to the last digit")
 
@@ -50,17 +53,6 @@ class Point:
     member: Member
     test: str
     estimate: Estimate
-
-
-@dataclass
-class _Collected:
-    """A finding of the reference run with the points of all runs."""
-
-    test: AnalysedTest
-    finding: Finding
-    points: list[Point] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
-    wrong: list[Reason] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -137,98 +129,90 @@ def series_of(members: Sequence[Member]) -> list[Series]:
         members, key=lambda m: (sum(len(t.result.findings) for t in m.tests), -m.number)
     )
     collected = {
-        (i, k): _Collected(test, finding)
-        for i, test in enumerate(reference.tests)
-        for k, finding in enumerate(test.result.findings)
+        id(finding): (test, finding, Collected(finding.unit))
+        for test in reference.tests
+        for finding in test.result.findings
         if not finding.recomputed
     }
-    places = {id(each.finding): each for each in collected.values()}
-    seen: dict[tuple[str, tuple[str, ...]], Member] = {}
+    seen: Seen = {}
     for member in members:
         for pair in pair_tests(reference.tests, member.tests).tests:
-            twin = _twin(seen, member, pair.other.name, pair.reference.name)
+            prints = member.identical.get(pair.other.name, ())
+            why = why_twin(seen, member, prints, pair.reference.name)
             for one, other in pair.findings:
-                entry = places[id(one)]
-                why = f"{TWIN} {twin.name}" if twin else ""
-                test, number = pair.other.name, other.known
-                add_point(entry.points, entry.left_out, member, test, number, one.unit, why)
-                if number.origin is Origin.CONTRADICTED:
-                    entry.wrong.append(number.reason)
-    return [_series(each) for each in collected.values()]
+                collected[id(one)][2].add(member, pair.other.name, other.known, why)
+    return [_series(*each) for each in collected.values()]
 
 
-def add_point(
-    points: list[Point],
-    left_out: list[str],
-    member: Member,
-    test: str,
-    estimate: Estimate,
-    unit: str,
-    why: str = "",
-) -> None:
-    """Append a point, or its reason to `left_out`: no finite value, a bound, given, or `why`."""
-    estimate = in_unit(estimate, unit)
-    if not why and not math.isfinite(estimate.value):
-        why = "not found"
-    if not why and estimate.kind in BOUNDS:
-        why = "a bound"
-    if not why and estimate.origin is Origin.GIVEN:
-        why = "given, not measured"
-    if why:
-        left_out.append(f"{member.name}: {why}")
-    else:
-        points.append(Point(member, test, estimate))
+@dataclass
+class Collected:
+    """Points of one number, collected run by run.
+
+    Attributes:
+        unit: of all points (SI).
+        left_out: runs without a point, with the reason.
+        wrong: reasons of the numbers whose model the data contradict.
+    """
+
+    unit: str
+    points: list[Point] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    wrong: list[Reason] = field(default_factory=list)
+
+    def add(self, member: Member, test: str, estimate: Estimate, why: str = "") -> None:
+        """Add a point, or to `left_out` why not: no finite value, a bound, given, or `why`."""
+        estimate = in_unit(estimate, self.unit)
+        if not why and not math.isfinite(estimate.value):
+            why = "not found"
+        if not why and estimate.is_bound:
+            why = "a bound"
+        if not why and estimate.origin is Origin.GIVEN:
+            why = "given, not measured"
+        if why:
+            self.left_out.append(f"{member.name}: {why}")
+        else:
+            self.points.append(Point(member, test, estimate))
+        if estimate.origin is Origin.CONTRADICTED:
+            self.wrong.append(estimate.reason)
+
+    def series(self, reason: Reason = NONE, **more: Any) -> Series:
+        """Create the series. `reason`: why no trend is estimated; by default from the points."""
+        values = [point.estimate.value for point in self.points]
+        if not reason and len(values) < LEAST:
+            whys = (why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in self.left_out)
+            counts = "; ".join(f"{why} in {count}" for why, count in Counter(whys).items())
+            reason = TOO_FEW_RUNS(runs=len(values), lost=f", {counts}" if counts else "")
+        if not reason and max(values) - min(values) <= 1e-12 * max(map(abs, values)):
+            reason = SAME_IN_ALL()
+        points, left_out = tuple(self.points), tuple(self.left_out)
+        return Series(unit=self.unit, points=points, left_out=left_out, reason=reason, **more)
 
 
-def made(
-    points: Sequence[Point], left_out: Sequence[str], reason: Reason = NONE, **more: object
-) -> Series:
-    """Create a series. `reason`: why no trend is estimated; by default checked from the points."""
-    values = [point.estimate.value for point in points]
-    if not reason and len(points) < LEAST:
-        whys = Counter(why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in left_out)
-        counts = "; ".join(f"{why} in {count}" for why, count in whys.items())
-        reason = TOO_FEW_RUNS(runs=len(points), lost=f", {counts}" if counts else "")
-    if not reason and max(values) - min(values) <= 1e-12 * max(map(abs, values)):
-        reason = SAME_IN_ALL()
-    return Series(
-        points=tuple(points),
-        left_out=tuple(left_out),
-        reason=reason,
-        **more,  # type: ignore[arg-type]
-    )
-
-
-def _series(found: _Collected) -> Series:
-    test, finding = found.test, found.finding
+def _series(test: AnalysedTest, finding: Finding, collected: Collected) -> Series:
     words = condition_words(test, finding.conditions)
     name = axis_quantity_name(test, finding.quantity)
     reason = FOLLOWS() if finding.quantity in DERIVED else NONE
-    if not reason and 2 * len(found.wrong) > len(found.points):
-        reason = WRONG_MODEL(side="most of it", why=found.wrong[0])
-    return made(
-        found.points,
-        found.left_out,
+    if not reason and 2 * len(collected.wrong) > len(collected.points):
+        reason = WRONG_MODEL(side="most of it", why=collected.wrong[0])
+    return collected.series(
         reason,
         test=test.name,
         title=test.title,
         quantity=finding.quantity,
         name=f"{name}, {words}" if words else name,
-        unit=finding.unit,
         display=display_unit(test, finding),
         conditions=finding.conditions,
     )
 
 
-def _twin(
-    seen: dict[tuple[str, tuple[str, ...]], Member], member: Member, test: str, of: str
-) -> Member | None:
-    """Earlier run with the same simulated trials of a test, seeds included; None without one."""
-    prints = member.identical.get(test, ())
-    if not prints:
-        return None
-    first = seen.setdefault((of, prints), member)
-    return first if first is not member else None
+def why_twin(seen: Seen, member: Member, prints: tuple[str, ...], test: str = "") -> str:
+    """Reason why a run is no new one: an earlier one has the same simulated trials; else "".
+
+    prints: fingerprints of its simulated trials of a test, seeds included. The run is added to
+    `seen`.
+    """
+    first = seen.setdefault((test, prints), member) if prints else member
+    return "" if first is member else f"{TWIN} {first.name}"
 
 
 def _own_errors(found: Sequence[Estimate]) -> Array:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from campaign.comparison.tables import counted
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
 from campaign.estimation.trends.changes import LEAST_FOR_A_JUMP, Jump
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
-from campaign.text import interval, number, pretty_unit
+from campaign.text import capitalized, count, interval, number, pretty_unit
 from campaign.trends.covariates import ORDER, TIME, Covariate
 from campaign.trends.rig_trends import JUMP, TREND, Trends, TrendSeries, Verdict
 
@@ -22,9 +22,7 @@ CIRCUMSTANCES = 4
 """Most changes beside a jump that a sentence names; the table has all."""
 
 
-def followed_table(
-    key: str, title: str, rows: Sequence[TrendSeries], covariate: Covariate
-) -> Table:
+def followed_table(rows: Sequence[TrendSeries], covariate: Covariate) -> Table:
     """Table with one row per number, each in its own unit."""
     per = covariate.per
     columns = [
@@ -55,7 +53,8 @@ def followed_table(
         Column("reason", "Why not judged"),
         Column("notes", "Notes"),
     ]
-    return Table(key, title, tuple(columns), tuple(_row(each, covariate) for each in rows))
+    cells = tuple(_row(each, covariate) for each in rows)
+    return Table("followed", "All numbers", tuple(columns), cells)
 
 
 def page_table(rows: Sequence[TrendSeries], covariate: Covariate) -> Table:
@@ -75,9 +74,8 @@ def page_table(rows: Sequence[TrendSeries], covariate: Covariate) -> Table:
             Column("before", "Before run"),
             Column("jump_seen", "Seen from"),
         ]
-    return Table("judged", "What was followed", tuple(columns), tuple(
-        _page_row(each, covariate) for each in rows
-    ))  # fmt: skip
+    cells = tuple(_page_row(each, covariate) for each in rows)
+    return Table("judged", "What was followed", tuple(columns), cells)
 
 
 def _page_row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
@@ -91,10 +89,9 @@ def _page_row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "p": each.smallest,
         "verdict": str(each.verdict),
     }
-    jump = each.change.jump if each.change is not None else None
-    if jump is not None:
+    if each.jump is not None:
         row |= {
-            "jump": _short(*jump_of(each, jump), each),
+            "jump": _short(*jump_of(each, each.jump), each),
             "before": _before(each, each.jumps) or "–",
             "jump_seen": detectable_words(each, JUMP, covariate),
         }
@@ -112,20 +109,19 @@ def points_table(trends: Trends) -> Table:
         Column("x", trends.covariate.label, exact=True),
         Column("value", "Value"),
     )
-    rows: list[dict[str, Cell]] = []
-    for each in trends.followed:
-        for place, point in zip(each.x, each.series.points, strict=True):
-            rows.append(
-                {
-                    "test": each.series.test,
-                    "quantity": each.series.name,
-                    "unit": pretty_unit(each.series.display),
-                    "number": point.member.number,
-                    "run": point.member.name,
-                    "x": float(place) if math.isfinite(place) else None,
-                    "value": in_unit(point.estimate, each.series.display),
-                }
-            )
+    rows = (
+        {
+            "test": each.series.test,
+            "quantity": each.series.name,
+            "unit": pretty_unit(each.series.display),
+            "number": point.member.number,
+            "run": point.member.name,
+            "x": float(place) if math.isfinite(place) else None,
+            "value": in_unit(point.estimate, each.series.display),
+        }
+        for each in trends.followed
+        for place, point in zip(each.x, each.series.points, strict=True)
+    )
     return Table("points", "All points", columns, tuple(rows))
 
 
@@ -164,27 +160,25 @@ def runs_table(trends: Trends) -> Table:
         Column("status", "Status"),
         Column("damaged", "Damaged places", exact=True),
     )
-    rows: list[dict[str, Cell]] = []
-    for member in trends.members:
-        x = trends.covariate.at(member, "")
-        rows.append(
-            {
-                "number": member.number,
-                "run": member.name,
-                "started": member.run.header.created,
-                "x": x if math.isfinite(x) else None,
-                "status": str(member.run.status),
-                "damaged": len(member.damaged),
-            }
-        )
+    rows = (
+        {
+            "number": member.number,
+            "run": member.name,
+            "started": member.run.header.created,
+            "x": x if math.isfinite(x := trends.covariate.at(member, "")) else None,
+            "status": str(member.run.status),
+            "damaged": len(member.damaged),
+        }
+        for member in trends.members
+    )
     return Table("runs", "The runs", columns, tuple(rows))
 
 
 def effect(each: TrendSeries, covariate: Covariate) -> tuple[Estimate, Estimate] | None:
     """Trend per `covariate.per`, in the display unit and relative to the mean; None without one."""
-    if each.change is None or each.change.trend is None:
+    if each.trend is None:
         return None
-    slope, size = each.change.trend.slope, covariate.step
+    slope, size = each.trend.slope, covariate.step
     return (
         each.estimate("trend", slope, each.series.display, size),
         _shared(each, each.estimate("trend", slope, "", size)),
@@ -201,8 +195,7 @@ def jump_of(each: TrendSeries, jump: Jump) -> tuple[Estimate, Estimate]:
 
 def headline(each: TrendSeries, trends: Trends) -> str:
     """Sentence on a declared number, without a period."""
-    name = each.series.name[:1].upper() + each.series.name[1:]
-    phrases = [f"{name} ({each.series.test})"]
+    phrases = [f"{capitalized(each.series.name)} ({each.series.test})"]
     if each.verdict is not Verdict.JUMPED:
         follows = trends.covariate.name in (TIME, ORDER)
         verb = "drifts by" if follows else f"follows {trends.covariate.name}:"
@@ -210,8 +203,8 @@ def headline(each: TrendSeries, trends: Trends) -> str:
             verb = "changes; as a drift, by"
         phrases.append(f"{verb} {_effect_words(each, trends.covariate)}")
     jumps = each.jumps
-    if each.verdict is Verdict.CHANGED and each.change is not None and each.change.jump is not None:
-        jumps = (each.change.jump,)
+    if each.verdict is Verdict.CHANGED and each.jump is not None:
+        jumps = (each.jump,)
     for jump in jumps:
         as_ = "or as a jump" if each.verdict is Verdict.CHANGED else "jumped"
         phrases.append(f"{as_} {_jump_words(each, jump, trends)}")
@@ -234,35 +227,32 @@ def beside_the_jump(each: TrendSeries, jump: Jump, trends: Trends) -> str:
 
 def sentences(trends: Trends) -> Iterator[str]:
     """Sentences that summarize the trends."""
-    count, judged = len(trends.members), trends.judged
-    several = judged != 1
+    runs, judged = len(trends.members), trends.judged
     yield (
-        f"{count} runs have {len(trends.followed)} numbers in common, of which {judged} "
-        f"{'are' if several else 'is'} judged."
+        f"{runs} runs have {len(trends.followed)} numbers in common, of which "
+        f"{count(judged, 'is', 'are')} judged."
     )
     declared = len(trends.declared)
     along = trends.covariate.name
     if declared:
-        are = "is" if declared == 1 else "are"
+        numbers = count(declared, "is", "are")
         yield (
-            f"{declared} {are} declared to change: at most {100 * RATE:g} % of what is declared "
-            f"so is expected to be false (Benjamini and Hochberg over {trends.tested} tests)."
+            f"{numbers} declared to change: at most {100 * RATE:g} % of what is declared so is "
+            f"expected to be false (Benjamini and Hochberg over {trends.tested} tests)."
         )
     elif judged:
         yield (
             f"No trend over {along} is shown. That does not say that there is none: the table says "
             "of each number how large one would have been seen."
         )
-    if trends.covariate.ordered and count < LEAST_FOR_A_JUMP:
+    if trends.covariate.ordered and runs < LEAST_FOR_A_JUMP:
         yield f"Whether anything has jumped is not determined: that takes {LEAST_FOR_A_JUMP} runs."
     yield from trends.notes
 
 
 def not_judged(trends: Trends) -> Iterator[str]:
-    """Reasons for no verdict with their counts, as `12: ...`, the most frequent first."""
-    counts = Counter(str(each.reason) for each in trends.of(Verdict.NOT_JUDGED))
-    for reason, count in counts.most_common():
-        yield f"{count}: {reason}"
+    """Reasons for no verdict with their counts (`counted`)."""
+    return counted(each.reason for each in trends.of(Verdict.NOT_JUDGED))
 
 
 def detectable_words(
@@ -290,7 +280,7 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "notes": "; ".join((*each.notes, *each.series.left_out)),
     }
     effects = effect(each, covariate)
-    if effects is None or each.change is None or each.change.trend is None:
+    if effects is None or each.trend is None:
         return row
     adjusted = each.adjusted or {}
     row |= {
@@ -300,18 +290,17 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "p_trend": each.p.get(TREND),
         "p_trend_adjusted": adjusted.get(TREND),
         "detectable_trend": detectable(each, TREND, covariate),
-        "scatter": each.series.scale * each.change.trend.scatter,
-        "correlation": each.change.trend.correlation,
+        "scatter": each.series.scale * each.trend.scatter,
+        "correlation": each.trend.correlation,
     }
-    jump = each.change.jump
-    if jump is None:
+    if each.jump is None:
         return row
-    sizes = jump_of(each, jump)
+    size, share = jump_of(each, each.jump)
     return row | {
-        "jump_before": _before(each, each.jumps or (jump,)),
-        "jump": sizes[0],
-        "jump_share": sizes[1],
-        "p_jump": jump.p,
+        "jump_before": _before(each, each.jumps or (each.jump,)),
+        "jump": size,
+        "jump_share": share,
+        "p_jump": each.jump.p,
         "p_jump_adjusted": adjusted.get(JUMP),
         "detectable_jump": detectable(each, JUMP, covariate),
     }

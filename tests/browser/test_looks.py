@@ -7,8 +7,8 @@ import io
 import pytest
 from matplotlib.image import imread
 
-from campaign.report.palette import contrast
 from tests.browser.pages import PAGES
+from tests.report.print_checks import contrast
 
 WIDTHS = (360, 768, 1024, 1440)
 SMALLEST_LABEL = 9.0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy import stats
 
 from campaign.api.analysis import AnalysedTest
 from campaign.api.quantity_words import condition_words
+from campaign.archive import ArchivedTrial
 from campaign.comparison.finding_pairs import pairs_of
 from campaign.comparison.same_quantity import pair_tests
 from campaign.comparison.tables import change_of
@@ -25,12 +27,10 @@ from campaign.trial import Task, Trial
 from tests.comparison.laboratory import analysed
 
 
-@dataclass(frozen=True)
-class Executed:
-    """A trial that nobody executed."""
-
-    trial: Trial
-    ending: Ending = field(default_factory=lambda: Ending(Outcome.COMPLETED))
+def executed(trial: Trial) -> ArchivedTrial:
+    """A completed trial without samples."""
+    ending = Ending(Outcome.COMPLETED)
+    return ArchivedTrial(trial, ending, "", "", Path(), "", samples=None)  # type: ignore[arg-type]
 
 
 def made_up(
@@ -38,7 +38,7 @@ def made_up(
 ) -> AnalysedTest:
     task = Task(mode="rate", duration=1.0, window=(0.0, 1.0), sample_rate=10.0)
     trials = tuple(
-        Executed(
+        executed(
             Trial(
                 number=n, test="t", kind="k", seed=1, task=task, point=point,  # type: ignore[arg-type]
                 bench=bench.model_dump(mode="json"),
@@ -46,7 +46,7 @@ def made_up(
         )
         for n, point in enumerate(points, start=1)
     )  # fmt: skip
-    data = TestData("t", "k", {}, trials)  # type: ignore[arg-type]
+    data = TestData("t", "k", {}, trials)
     return analysed(data, Result(findings=tuple(findings)), **more)
 
 
@@ -117,9 +117,9 @@ def test_one_side_of_one_trial_is_said_to_be_it(platform: Bench):
 
 def test_a_failed_trial_is_none_of_those_behind_a_number(platform: Bench):
     test = made_up([found(10.0, 0.1)], [{"position": 0.0}] * 2, platform)
-    failed = Executed(test.trials[1].trial, Ending(Outcome.LIMIT, "the rate limit"))
+    failed = replace(test.trials[1], ending=Ending(Outcome.LIMIT, "the rate limit"))
     cut = analysed(
-        TestData("t", "k", {}, (test.trials[0], failed)),  # type: ignore[arg-type]
+        TestData("t", "k", {}, (test.trials[0], failed)),
         test.result,
     )
     (pair,) = pairs_of(pair_tests([test], [cut]).tests[0])

@@ -83,7 +83,7 @@ def test_of_simulated_truths_the_true_values_count(platform: Bench):
     def true(digest: str) -> AnalysedTest:
         found = made_up([], [{"position": 0.0}], platform)
         trial = found.trials[0].trial.model_copy(update={"truth": digest})
-        executed = type(found.trials[0])(trial)  # type: ignore[call-arg]
+        executed = replace(found.trials[0], trial=trial)
         return analysed(TestData("t", "k", {}, (executed,)), Result())
 
     one, other = true("a" * 64), true("b" * 64)

@@ -45,11 +45,21 @@ DEFICIENCIES = {
 }
 
 
+def linear(colour: str) -> np.ndarray:
+    """Linear red, green and blue of `#rrggbb`, 0 to 1."""
+    rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+
+
+def contrast(first: str, second: str) -> float:
+    """WCAG 2.1 contrast ratio of two `#rrggbb` colours, 1 to 21."""
+    low, high = sorted(linear(colour) @ [0.2126, 0.7152, 0.0722] for colour in (first, second))
+    return float((high + 0.05) / (low + 0.05))
+
+
 def lab(colour: str, matrix: Any) -> np.ndarray:
     """CIELAB (D65) of `#rrggbb` as an eye with the deficiency `matrix` sees it."""
-    rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    seen = np.clip(np.array(matrix) @ linear, 0, 1)
+    seen = np.clip(np.array(matrix) @ linear(colour), 0, 1)
     xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]] @ seen
     x, y, z = np.cbrt(xyz / [0.9505, 1.0, 1.089])
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])

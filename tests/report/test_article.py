@@ -47,7 +47,7 @@ def made() -> Article:
         Files((("More in", grid.download),)),
     )
     return Article(
-        "trend", "Trends", "campaign trend", "A title <b>", "What it is about.",
+        "Trends", "campaign trend", "A title <b>", "What it is about.",
         (("", (("Run", "one"),)),),
         (*problems_part("it", ["what is wrong"]), Part("all", "All of it", pieces, role="test")),
         folder,

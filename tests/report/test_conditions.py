@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 from campaign.experiments import experiments
 from campaign.report.content.conditions import conditions_of
+from campaign.report.content.written_units import TestUnits
 from campaign.result import Result
 from campaign.trial import Trial
 from tests.experiments.laboratory import trials
@@ -32,7 +33,7 @@ def test_only_options_that_acted_are_conditions() -> None:
             options=closed.options,
             experiment=experiments()["frequency_response"],
         )
-        return {name for name, _ in conditions_of(test)}  # type: ignore[arg-type]
+        return {name for name, _ in conditions_of(test, TestUnits(test))}  # type: ignore[arg-type]
 
     one, both = labels(closed), labels(closed, opened)
     assert {"frequency (swept)", "cycles", "settle time", "loop", "amplitude"} <= one

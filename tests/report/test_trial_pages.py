@@ -42,7 +42,6 @@ from campaign.report.drawing.traces import (
     RIGHT,
     TOP,
     WIDTH,
-    Stretch,
     Trace,
     draw_traces,
 )
@@ -472,7 +471,7 @@ def test_windows_are_shaded_where_they_are_and_no_farther() -> None:
         np.linspace(0.0, 10.0, 11),
         [Trace("a", np.arange(11.0), SERIES["lugre"])],
         "N",
-        [Stretch("in", 2.5, 5.0), Stretch("over", 7.5, 99.0)],
+        [Window("in", 2.5, 5.0), Window("over", 7.5, 99.0)],
         [(5.0, "half"), (11.0, "later")],
     )
     found = re.findall(r'class="window" x="([\d.]+)" y="8" width="([\d.]+)"', svg)

@@ -14,7 +14,7 @@ from campaign.reason import Reason
 from campaign.trends.covariates import Covariate
 from campaign.trends.members import Member
 from campaign.trends.rig_trends import WITHIN, TrendSeries, Verdict, _followed, _judged
-from campaign.trends.series import Point, Series, add_point, made
+from campaign.trends.series import Collected, Series
 
 CALIBRATED = "torque constant"
 
@@ -41,12 +41,11 @@ def number(value: float, half: float | None = 0.1, **more: object) -> Estimate:
 
 def series(*found: Estimate, constants: str = "") -> Series:
     keys = constants.split() or ["one"] * len(found)
-    points: list[Point] = []
-    left_out: list[str] = []
+    collected = Collected("N m")
     for n, (estimate, key) in enumerate(zip(found, keys, strict=True), start=1):
-        add_point(points, left_out, member(n, key), "map", estimate, "N m")
-    return made(points, left_out, "", test="map", title="Map", quantity="coulomb_torque",
-                name="Coulomb friction Tc", unit="N m", display="N m")  # fmt: skip
+        collected.add(member(n, key), "map", estimate)
+    return collected.series(test="map", title="Map", quantity="coulomb_torque",
+                            name="Coulomb friction Tc", display="N m")  # fmt: skip
 
 
 TIME = Covariate("time", "Time", "d", "month", 30.0, ordered=True, at=lambda m, _: 30.0 * m.number)

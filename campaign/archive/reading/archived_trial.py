@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from campaign.estimate import Estimate, Window
-from campaign.recording import ChannelInfo, Ending, Recording
-from campaign.trial import Trial
+from campaign.recording import ChannelInfo, Ending, Outcome, Recording
+from campaign.trial import Role, Trial
 
 
 class Samples(Protocol):
@@ -57,6 +57,10 @@ class ArchivedTrial:
     windows: tuple[Window, ...] = ()
     estimates: tuple[Estimate, ...] = ()
     measured_by: str = ""
+
+    @property
+    def is_completed_measurement(self) -> bool:
+        return self.ending.outcome is Outcome.COMPLETED and self.trial.role is Role.MEASUREMENT
 
     @property
     def not_kept(self) -> str:

@@ -10,13 +10,12 @@ from campaign.api.analysis import AnalysedTest
 from campaign.experiments.interface import options_of
 from campaign.report.content.recording_sources import recorded_from
 from campaign.report.content.written_units import TestUnits
-from campaign.text import path_words
+from campaign.text import count, path_words
 from campaign.trial import Role, canonical_json
 
 
-def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterator[tuple[str, str]]:
+def conditions_of(test: AnalysedTest, units: TestUnits) -> Iterator[tuple[str, str]]:
     """Kind, bench, sweep and effective options as text, in the units of the protocol."""
-    units = units or TestUnits(test)
     yield "Experiment", test.kind
     if test.bench:
         yield (
@@ -26,8 +25,8 @@ def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterato
     if test.source:
         yield "Samples from", test.source
     yield from recorded_from(test)
-    count = f"{len(test.trials)} executed"
-    yield "Trials", count + (f", {len(test.failed)} not completed" if test.failed else "")
+    failed = f", {len(test.failed)} not completed" if test.failed else ""
+    yield "Trials", f"{len(test.trials)} executed{failed}"
     points = _points(test)
     for path, values in points.items():
         yield f"{path_words(path)} (swept)", units.words(path, values)
@@ -85,7 +84,7 @@ def summary_of(test: AnalysedTest) -> str:
     parts: Sequence[str] = (
         test.kind.replace("_", " "),
         f"bench {test.bench.name}" if test.bench else "",
-        f"{len(test.trials)} trials" if len(test.trials) != 1 else "1 trial",
+        count(len(test.trials), "trial"),
         test.source,
     )
     return ", ".join(part for part in parts if part)

@@ -29,9 +29,12 @@ from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.references import Files, References, compared_with
 from campaign.report.content.settings import tree_settings
 from campaign.report.content.truth import truth_tables
+from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Table
 
 NO_FILES: Files = {}
+FAILED = 200
+"""Maximum number of listed failed trials; the archive has all."""
 ANEW = "the program that made this page, whatever is archived"
 
 
@@ -41,6 +44,7 @@ class Document:
 
     Attributes:
         tests: in the protocol's order.
+        units: display units by test.
         published: published values of the run's protocol, by table.
         truths: table of true values, or of compensation values, by test, if known.
         references: comparison of findings with bench files and files of reference values.
@@ -51,6 +55,7 @@ class Document:
     run: RunReader
     trials: tuple[ArchivedTrial, ...]
     tests: tuple[AnalysedTest, ...]
+    units: Mapping[str, TestUnits]
     published: Published
     scoreboard: Scoreboard
     truths: Mapping[str, Table]
@@ -127,18 +132,20 @@ def document_of(
     _, of_pages = readable(run.path, [t for t in trials if t.trial.number in shown])
     damaged = tuple(dict.fromkeys((*damage_of(run, tests), *happened.damaged, *of_pages)))
     scoreboard = score(published, [test.evidence() for test in tests])
-    truths = {**held_tables(run, tests, published), **truth_tables(run, tests)}
-    references = compared_with(run, tests, files)
+    units = units_of(tests, run.header)
+    truths = {**held_tables(run, tests, published), **truth_tables(run, tests, units)}
+    references = compared_with(run, tests, units, files)
     return Document(
         run,
         trials,
         tests,
+        units,
         published,
         scoreboard,
         truths,
         references,
         happened,
-        opening_of(run, tests, scoreboard, truths, references, damaged),
+        opening_of(run, tests, units, scoreboard, truths, references, damaged),
         damaged,
         ANEW if measure_anew else _measured_by(trials),
     )

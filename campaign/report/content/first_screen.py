@@ -10,14 +10,16 @@ from campaign.api.estimate_text import remarks, shows_interval
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import axis_terms
+from campaign.experiments.shared.captions import listed
 from campaign.published.headline import LIMITS, NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
 from campaign.report.content.key_numbers import KeyNumber, shown_key_numbers
 from campaign.report.content.references import References
 from campaign.report.content.run_problems import wrong_with
 from campaign.report.content.truth import COUNTED, biases, held
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.written_units import TestUnits
 from campaign.result import Figure, Result, Table
+from campaign.text import count
 
 FROM = {
     "simulation": "simulated",
@@ -120,13 +122,13 @@ class FirstScreen:
 def opening_of(
     run: RunReader,
     tests: Sequence[AnalysedTest],
+    units: Mapping[str, TestUnits],
     scoreboard: Scoreboard,
     truths: Mapping[str, Table],
     references: References,
-    damaged: Sequence[Damage] = (),
+    damaged: Sequence[Damage],
 ) -> FirstScreen:
     """First screen of a run's report; `damaged` is all damage that the report detected."""
-    units = units_of(tests, run.header)
     return FirstScreen(
         tuple(
             _answer(test, truths.get(test.name), references, scoreboard, units[test.name])
@@ -266,12 +268,10 @@ def _asked(run: RunReader, tests: Sequence[AnalysedTest]) -> str:
     """Sentence such as `3 tests, 35 trials on the bench platform, simulated.`"""
     if not tests:
         return "The protocol has no test."
-    trials, count = len(run.plan), "1 test" if len(tests) == 1 else f"{len(tests)} tests"
     benches = list(dict.fromkeys(test.bench.name for test in tests if test.bench))
-    words = [f"{count}, {trials} {'trial' if trials == 1 else 'trials'}"]
+    words = [f"{count(len(tests), 'test')}, {count(len(run.plan), 'trial')}"]
     if benches:
-        names = " and ".join(filter(None, (", ".join(benches[:-1]), benches[-1])))
-        words.append(f" on the {'bench' if len(benches) == 1 else 'benches'} {names}")
+        words.append(f" on the {'bench' if len(benches) == 1 else 'benches'} {listed(benches)}")
     source = FROM.get(next((test.source for test in tests if test.source), ""), "")
     words.append(f", {source}" if source else "")
     if run.header.truth.plants:
@@ -287,14 +287,13 @@ def _compared(scoreboard: Scoreboard) -> str:
     summary = headline(scoreboard)
     if not summary.compared:
         return ""
-    free = [count for count in summary.counts if count.status in NOBODY_FITTED]
-    others = [count for count in summary.counts if count.status not in NOBODY_FITTED]
+    free = [each for each in summary.counts if each.status in NOBODY_FITTED]
+    others = [each for each in summary.counts if each.status not in NOBODY_FITTED]
     shares = [
         f"{sum(each.good for each in counts)} of {sum(each.compared for each in counts)} {which}"
         for counts, which in ((free, "not fitted"), (others, "others" if free else ""))
         if counts
     ]
-    what = "published value" if summary.compared == 1 else "published values"
     fitted = "" if free else ", none of which is a prediction"
     near = [
         f"{sum(each.within[LIMITS.index(limit)] for each in summary.counts)} within {limit} %"
@@ -302,6 +301,6 @@ def _compared(scoreboard: Scoreboard) -> str:
     ]
     numbers = sum(each.numbers for each in summary.counts)
     close = f" Of {numbers} numbers, {' and '.join(near)}." if numbers else ""
-    return f"{summary.compared} {what} compared. Reproduced: {' and '.join(shares)}".rstrip() + (
-        f"{fitted}.{close}"
-    )
+    values = count(summary.compared, "published value")
+    reproduced = f"{values} compared. Reproduced: {' and '.join(shares)}".rstrip()
+    return f"{reproduced}{fitted}.{close}"

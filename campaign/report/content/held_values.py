@@ -25,7 +25,7 @@ from campaign.physics.true_values import true_of, true_value
 from campaign.published.values import Cell as PublishedCell
 from campaign.published.values import Published, heading_of
 from campaign.report.content.lines import cell_name
-from campaign.report.content.published_columns import cell_of, value_in
+from campaign.report.content.published_columns import cell_of
 from campaign.report.content.truth import (
     COUNTED,
     SIMULATED,
@@ -253,7 +253,7 @@ def _row(number: HeldValue, cell: PublishedCell | None, simulated: Sequence[Benc
         "direction": number.conditions.get("direction", ""),
         "compensation": number.compensation,
         "unit": unit,
-        "published": None if cell is None else value_in(cell, unit),
+        "published": None if cell is None else cell.in_unit(unit),
         "printed_in": "" if cell is None else heading_of(cell.table),
         "held": number.stated,
         "found": replace(number.found, unit=unit),

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from campaign.estimate import OF_ONE_TRIAL
+from campaign.experiments.shared.captions import listed
 from campaign.published.headline import LIMITS, Headline, headline, is_compared
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
@@ -14,7 +15,7 @@ from campaign.published.verdicts import GOOD
 from campaign.report.palette import MUTED, STATUS
 from campaign.result import Cell as TableCell
 from campaign.result import Column, Table
-from campaign.text import interval, minus, number, percent, pretty_unit
+from campaign.text import count, interval, minus, number, percent, pretty_unit
 
 SIGNS = {
     "o": "●",
@@ -92,7 +93,6 @@ class ScoredTable:
 
     Attributes:
         anchor: anchor of its complete numbers on the page; "" without one.
-        tests: names of the tests that measured them.
         compared, good: counts of compared and of reproduced numbers, without those that the
             document makes impossible to reproduce.
     """
@@ -100,7 +100,6 @@ class ScoredTable:
     table: str
     title: str
     anchor: str
-    tests: tuple[str, ...]
     lines: tuple[ShownLine, ...]
     compared: int
     good: int
@@ -119,7 +118,6 @@ def scored_tables(
                 table=name,
                 title=published[name].title,
                 anchor=anchors.get(name, ""),
-                tests=tuple(dict.fromkeys(line.test for line in lines if line.test)),
                 lines=tuple(map(shown_line, lines)),
                 compared=len(compared),
                 good=sum(line.verdict in GOOD for line in compared),
@@ -169,9 +167,9 @@ def statuses(scoreboard: Scoreboard) -> tuple[tuple[str, str, str, int], ...]:
     """Status, CSS name, sign and count of lines, for each status that occurs."""
     counts = {s: sum(line.status is s for line in scoreboard.lines) for s in Status}
     return tuple(
-        (str(status), STATUS[status].name, SIGNS[STATUS[status].marker], count)
-        for status, count in counts.items()
-        if count
+        (str(status), STATUS[status].name, SIGNS[STATUS[status].marker], n)
+        for status, n in counts.items()
+        if n
     )
 
 
@@ -195,7 +193,7 @@ def agreement(scoreboard: Scoreboard) -> str:
 def closeness(scoreboard: Scoreboard) -> Table | None:
     """Table of values within each deviation limit, by status; None without any deviation."""
     counts = headline(scoreboard).counts
-    if not any(count.numbers for count in counts):
+    if not any(each.numbers for each in counts):
         return None
     limits = tuple(Column(f"within_{n}", f"≤ {n} %", exact=True) for n in LIMITS)
     columns = (
@@ -207,13 +205,13 @@ def closeness(scoreboard: Scoreboard) -> Table | None:
     )
     rows: Iterator[dict[str, TableCell]] = (
         {
-            "status": str(count.status),
-            "compared": count.compared,
-            "reproduced": count.good,
-            "numbers": count.numbers,
-            **{each.name: n for each, n in zip(limits, count.within, strict=True)},
+            "status": str(each.status),
+            "compared": each.compared,
+            "reproduced": each.good,
+            "numbers": each.numbers,
+            **{column.name: n for column, n in zip(limits, each.within, strict=True)},
         }
-        for count in counts
+        for each in counts
     )
     title = "Deviation from the published values, by status: values within each limit"
     return Table("closeness", title, columns, tuple(rows))
@@ -226,8 +224,8 @@ def _cell_in_words(line: Line) -> str:
 
 def _sentences(found: Headline) -> Iterator[str]:
     shares = ", ".join(f"{c.status} {c.good} of {c.compared}" for c in found.counts)
-    values = "published value" if found.compared == 1 else "published values"
-    yield f"{found.compared} {values} compared, each counted once, also if printed several times."
+    values = count(found.compared, "published value")
+    yield f"{values} compared, each counted once, also if printed several times."
     yield _bridge(found)
     yield f"Reproduced (they agree, are compatible or meet their claim): {shares}."
     missed = ", ".join(dict.fromkeys(map(_cell_in_words, found.missed)))
@@ -238,21 +236,19 @@ def _sentences(found: Headline) -> Iterator[str]:
         (len(found.not_found), "not found"),
         (len(found.not_run), "not run"),
     )
-    if any(count for count, _ in rest):
-        counts = ", ".join(f"{count} {what}" for count, what in rest if count)
+    if counts := ", ".join(f"{n} {what}" for n, what in rest if n):
         yield f"Besides: {counts}."
 
 
 def _bridge(found: Headline) -> str:
     """Sentence that accounts for the printed numbers that are not compared."""
-    excluded = sum(count for _, count in found.excluded)
+    excluded = sum(n for _, n in found.excluded)
     without = found.printed - found.repeats - excluded - found.compared
     less = (
-        *([f"{found.repeats} repeat{'s' * (found.repeats > 1)}"] if found.repeats else []),
-        *(f"{count} {status}" for status, count in found.excluded),
+        *([count(found.repeats, "repeat")] if found.repeats else []),
+        *(f"{n} {status}" for status, n in found.excluded),
         *([f"{without} without a number to compare"] if without else []),
     )
     if not less:
         return f"Printed: {found.printed}, all compared."
-    listed = " and ".join(filter(None, (", ".join(less[:-1]), less[-1])))
-    return f"Printed: {found.printed}. Excluded: {listed}. Compared: {found.compared}."
+    return f"Printed: {found.printed}. Excluded: {listed(less)}. Compared: {found.compared}."

@@ -17,7 +17,7 @@ from campaign.published.values import PublishedTable, heading_of
 from campaign.report.content.lines import cell_name
 from campaign.report.content.tables import PUBLISHED
 from campaign.result import Column, Finding, Table, Value, bare
-from campaign.units import convert
+from campaign.text import capitalized
 
 NUMBERS = ("equal", "near")
 """Relations of cells that are numbers and not claims."""
@@ -47,7 +47,7 @@ def with_published(
         PUBLISHED, "Published", column.unit, column.display, exact=True, decimals=decimals
     )
     rows = (
-        {**row, PUBLISHED: None if cell is None else value_in(cell, column.unit)}
+        {**row, PUBLISHED: None if cell is None else cell.in_unit(column.unit)}
         for row, cell in zip(table.rows, cells, strict=True)
     )
     return replace(
@@ -87,14 +87,6 @@ def cell_of(
     )
 
 
-def value_in(cell: PublishedCell, unit: str) -> float | None:
-    """A published number in another unit; None for an incompatible unit."""
-    try:
-        return float(convert(cell.value, cell.unit, unit))
-    except ValueError:
-        return None
-
-
 def _sources(cells: Sequence[PublishedCell]) -> Iterator[str]:
     """Sentences on the tables of these cells, and on cells with a mark of the document."""
     headings = dict.fromkeys(heading_of(cell.table) for cell in cells)
@@ -104,5 +96,4 @@ def _sources(cells: Sequence[PublishedCell]) -> Iterator[str]:
         if cell.status:
             doubtful.setdefault(cell.status, []).append(cell_name(cell))
     for status, names in doubtful.items():
-        head = f"{status[:1].upper()}{status[1:]} among them"
-        yield f"{head}: {', '.join(dict.fromkeys(names))}."
+        yield f"{capitalized(status)} among them: {', '.join(dict.fromkeys(names))}."

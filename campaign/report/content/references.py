@@ -14,12 +14,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
 from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
 from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench
@@ -29,10 +28,10 @@ from campaign.physics.true_values import QUANTITIES
 from campaign.reason import Cause
 from campaign.references.values import ReferenceValue
 from campaign.references.verdict import JudgedNumber, Verdict, with_verdicts
-from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of, signed
+from campaign.report.content.written_units import TestUnits
 from campaign.result import Cell, Column, Finding, Table
-from campaign.text import number, quantity_words
+from campaign.text import count, quantity_words
 from campaign.trial import Trial
 from campaign.units import same_dimension
 
@@ -93,10 +92,10 @@ Files = Mapping[Path, Sequence[ReferenceValue]]
 Found = tuple[AnalysedTest, Source, Sequence[JudgedNumber]]
 
 
-def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -> References:
+def compared_with(
+    run: RunReader, tests: Iterable[AnalysedTest], units: Mapping[str, TestUnits], files: Files
+) -> References:
     """Compare each test's findings with its bench file and with `files`."""
-    tests = tuple(tests)
-    units = units_of(tests, run.header) if tests else {}
     comparisons: list[Found] = []
     for test in tests:
         with axis_terms(test.sides):
@@ -167,7 +166,7 @@ def _measured(run: RunReader, trial: Trial) -> bool:
 def _bench(trial: Trial) -> Bench | None:
     try:
         return bench_of(trial)
-    except (LookupError, ValidationError, ValueError):
+    except (LookupError, ValueError):
         return None
 
 
@@ -177,7 +176,7 @@ def _bench(trial: Trial) -> Bench | None:
 def _of_file(path: Path, values: Sequence[ReferenceValue], units: TestUnits) -> Found:
     own = [(value, each) for value in values for each in _to_compare(_spoken_of(value, units))]
     known = list({id(finding): finding for _, finding in own}.values())
-    pairs = [_pair(value.in_unit_of(finding), finding, known) for value, finding in own]
+    pairs = [_pair(in_unit(value.estimate, each.unit), each, known) for value, each in own]
     name = path.name
     title = f"Reference values of {name}, and found"
     said = f"The reference values are of {name}"
@@ -289,11 +288,11 @@ def _told_of(pairs: Sequence[JudgedNumber], source: Source, units: TestUnits) ->
         more = f"; {len(changed) - NAMED} more" if len(changed) > NAMED else ""
         parts.append(f"{len(changed)} of {tested} numbers {source.differ}: {named}{more}")
     elif tested:
-        numbers = "1 number does" if tested == 1 else f"{tested} numbers do"
+        numbers = count(tested, "number does", "numbers do")
         parts.append(f"{numbers} not differ from {source.before}, as far as the intervals show")
     if beyond:
-        lie = "1 number lies" if beyond == 1 else f"{beyond} numbers lie"
-        parts.append(f"{lie} beyond a bound, of which no test is made")
+        numbers = count(beyond, "number lies", "numbers lie")
+        parts.append(f"{numbers} beyond a bound, of which no test is made")
     return "; ".join(parts)
 
 
@@ -301,16 +300,11 @@ def _told(pair: JudgedNumber, units: TestUnits) -> str:
     words, change = _name(pair, units), pair.found.change
     if math.isnan(change.value):
         return words
-    size = f"{words} by {_signed(change.value)} %"
-    low, high = (None if end is None else _signed(end) for end in change.combined)
+    size = f"{words} by {signed(100.0 * change.value)} %"
+    low, high = (None if end is None else signed(100.0 * end) for end in change.combined)
     return size if None in (low, high) or low == high else f"{size} ({low} to {high} %)"
 
 
 def _name(pair: JudgedNumber, units: TestUnits) -> str:
     where = conditions_text(pair.conditions, units)
     return f"{quantity_words(pair.quantity)} ({where})" if where else quantity_words(pair.quantity)
-
-
-def _signed(share: float) -> str:
-    """A share as text in percent with its sign."""
-    return f"{'+' if share > 0 else ''}{number(100.0 * share, 2)}"

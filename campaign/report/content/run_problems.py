@@ -12,6 +12,7 @@ from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials
 from campaign.experiments.shared.common import method
 from campaign.recording import Outcome, SafeState
+from campaign.text import count
 
 WORDS = {
     Outcome.LIMIT: "ended at a limit",
@@ -41,18 +42,18 @@ def wrong_with(
     yield from _not_executed(run)
     yield from _failed(run, tests)
     yield from _never_ran(run, tests)
-    yield from _damage(run, damaged)
+    yield from _damage(damaged)
     without = [test.title for test in tests if test.problem and test.trials]
     if without:
         names = ", ".join(without)
-        yield f"No result of {len(without)} of {_trials(len(tests), 'test')}: {names}."
+        yield f"No result of {len(without)} of {count(len(tests), 'test')}: {names}."
 
 
 def without_trials(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
     """One line on tests without any executed trial, after the end of the run as the cause."""
     names = [test.name for test in tests if test.problem == NOT_EXECUTED]
     if names:
-        sentence = f"No trial of {_trials(len(names), 'test')} was executed: {', '.join(names)}."
+        sentence = f"No trial of {count(len(names), 'test')} was executed: {', '.join(names)}."
         yield " ".join((*_end(run), sentence))
 
 
@@ -68,24 +69,25 @@ def _safety(run: RunReader) -> Iterator[str]:
     if run.safe_state is SafeState.NOT_CONFIRMED:
         yield "Safe state NOT confirmed: the bench was not seen at rest, its drive off, at the end."
     if unsafe:
-        yield f"After {_trials(len(unsafe))} the bench was not seen at rest with its drive off."
+        trials = count(len(unsafe), "trial")
+        yield f"After {trials} the bench was not seen at rest with its drive off."
 
 
 def _not_executed(run: RunReader) -> Iterator[str]:
     lost = len(lost_trials(run))
     hidden = hidden_trials(run)
     missing = len(run.plan) - len(run.trials) - lost - hidden
+    planned = count(len(run.plan), "trial")
     if hidden:
         they = "it was" if hidden == 1 else "they were"
         yield (
-            f"{hidden} of {_trials(len(run.plan))} cannot be read, and the archive does not say "
-            f"any more whether {they} executed."
+            f"{hidden} of {planned} cannot be read, and the archive does not say any more whether "
+            f"{they} executed."
         )
     if missing > 0:
-        were = "was" if missing == 1 else "were"
-        yield f"{missing} of {_trials(len(run.plan))} {were} not executed."
+        yield f"{missing} of {planned} {'was' if missing == 1 else 'were'} not executed."
     if lost:
-        yield f"{_trials(lost)} {'was' if lost == 1 else 'were'} executed and cannot be read."
+        yield f"{count(lost, 'trial was', 'trials were')} executed and cannot be read."
 
 
 def _failed(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
@@ -97,15 +99,15 @@ def _failed(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
     others = [trial for trial, yes in zip(failed, is_sought, strict=True) if not yes]
     if others:
         yield (
-            f"{len(others)} of {_trials(len(run.trials), 'executed trial')} did not complete"
+            f"{len(others)} of {count(len(run.trials), 'executed trial')} did not complete"
             f" ({_by_outcome(others)}); {_commonest(others)}."
         )
     for name, title in seekers.items():
         own = sum(each.trial.test == name for each in sought)
         if own:
             yield (
-                f"{_trials(own)} of {title} ended early, at a limit or undefined: it goes to where "
-                "a loop becomes unstable, and such an end is a result."
+                f"{count(own, 'trial')} of {title} ended early, at a limit or undefined: it goes to"
+                " where a loop becomes unstable, and such an end is a result."
             )
 
 
@@ -130,12 +132,12 @@ def _never_ran(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
 
 def _by_outcome(failed: Sequence[ArchivedTrial]) -> str:
     counts = Counter(each.ending.outcome for each in failed)
-    return ", ".join(f"{count} {_ended(outcome, count)}" for outcome, count in counts.most_common())
+    return ", ".join(f"{n} {_ended(outcome, n)}" for outcome, n in counts.most_common())
 
 
-def _ended(way: Outcome, count: int) -> str:
+def _ended(way: Outcome, trials: int) -> str:
     if way is Outcome.INTERRUPTED:
-        return "was interrupted" if count == 1 else "were interrupted"
+        return "was interrupted" if trials == 1 else "were interrupted"
     return WORDS.get(way, str(way))
 
 
@@ -151,16 +153,12 @@ def _commonest(failed: Sequence[ArchivedTrial]) -> str:
     return f"{'the reason' if len(alike) == 1 else 'such as'}: {_short(alike[0])}"
 
 
-def _damage(run: RunReader, damaged: Sequence[Damage]) -> Iterator[str]:
+def _damage(damaged: Sequence[Damage]) -> Iterator[str]:
     if damaged:
-        places = "1 place" if len(damaged) == 1 else f"{len(damaged)} places"
+        places = count(len(damaged), "place")
         yield (
             f"The archive is damaged in {places}: what cannot be read is in none of these numbers."
         )
-
-
-def _trials(count: int, what: str = "trial") -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _short(text: str) -> str:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from urllib.parse import quote
 
-from campaign.axis_kind import in_axis_terms
+from campaign.api.estimate_text import of_unknown_size
 from campaign.estimate import Estimate, Origin
 from campaign.reason import NONE
-from campaign.result import Cell, Column, Table, Value, bare
-from campaign.text import NARROW, SHORT, interval, minus, number, pretty_unit
+from campaign.result import Cell, Column, Table, Value, bare, is_number
+from campaign.text import NARROW, SHORT, csv_text, interval, minus, number, pretty_unit
 from campaign.units import convert
 
 ROWS = 300
@@ -89,7 +87,7 @@ def show(table: Table, *, once: bool = True) -> ShownTable:
         common, columns, rows = _said_once(columns, rows)
     shown = [_shown_column(column, rows) for column in columns]
     headers = tuple(
-        f"{column.label} ({pretty_unit(_unit(column))})" if _unit(column) else column.label
+        f"{column.label} ({pretty_unit(column.shown_unit)})" if column.shown_unit else column.label
         for column in columns
     )
     notes = ([f"In all rows: {'; '.join(common)}."] if common else []) + list(remarks(table))
@@ -122,7 +120,9 @@ def _said_once(
             unit = str(cells[0])
         elif len(words) == len(cells) or (column.exact and not _takes_unit(column, rows)):
             text = _shown_column(column, rows)[0].text
-            texts.append(" ".join(filter(None, (column.label, text, pretty_unit(_unit(column))))))
+            texts.append(
+                " ".join(filter(None, (column.label, text, pretty_unit(column.shown_unit))))
+            )
         else:
             kept.append(column)
     if unit:
@@ -133,7 +133,7 @@ def _said_once(
 def _takes_unit(column: Column, rows: Sequence[Mapping[str, Cell]]) -> bool:
     """Whether the unit of the row applies to a column: its numbers are no counts."""
     cells = [row.get(column.name) for row in rows]
-    return not _unit(column) and any(isinstance(cell, float | Estimate) for cell in cells)
+    return not column.shown_unit and any(isinstance(cell, float | Estimate) for cell in cells)
 
 
 def table_csv(table: Table) -> str:
@@ -155,14 +155,14 @@ def table_csv(table: Table) -> str:
     headers += [f"{_csv_name(column)}_origin" for column in flagged]
     rows = (
         [
-            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in first),
-            *(_exact(_displayed(end, c)) for c in ends for end in _ends(row.get(c.name))),
-            *(_exact(_displayed(bare(row.get(c.name)), c)) for c in last),
+            *(_displayed(bare(row.get(c.name)), c) for c in first),
+            *(_displayed(end, c) for c in ends for end in _ends(row.get(c.name))),
+            *(_displayed(bare(row.get(c.name)), c) for c in last),
             *(_origin(row.get(c.name)) for c in flagged),
         ]
         for row in table.rows
     )
-    return _csv(headers, rows)
+    return csv_text(headers, rows)
 
 
 def _origin(cell: Cell) -> str:
@@ -194,11 +194,8 @@ def remarks(table: Table) -> Iterator[str]:
             "Numbers with five digits and no interval: it is narrower than the last digit; the CSV "
             "file has it."
         )
-    sources = dict.fromkeys(
-        source for column in table.columns for source in _of_unknown_size(table, column)
-    )
-    if sources:
-        yield f"Not included in the intervals (size unknown): {', '.join(sources)}."
+    cells = (cell for column in table.columns for cell in _numbers(table, column))
+    yield from of_unknown_size(cell for cell in cells if isinstance(cell, Estimate))
 
 
 def _by_reason(
@@ -250,7 +247,7 @@ def _placed(table: Table, column: Column) -> Iterator[tuple[int, Estimate | floa
     """Numeric cells of a column, also undetermined ones, each with the index of its row."""
     for place, row in enumerate(table.rows):
         cell = row.get(column.name)
-        if isinstance(cell, Estimate | float | int) and not isinstance(cell, bool):
+        if isinstance(cell, Estimate) or is_number(cell):
             yield place, cell
 
 
@@ -259,24 +256,17 @@ def _numbers(table: Table, column: Column) -> list[Estimate | float | int]:
     return [cell for _, cell in _placed(table, column)]
 
 
-def _open(cell: Estimate | float | int) -> bool:
-    return isinstance(cell, Estimate) and cell.origin is Origin.NOT_DETERMINED
-
-
-def _given(cell: Estimate) -> bool:
-    """Whether a number was set: it is exact and needs no interval."""
-    return cell.origin is Origin.GIVEN
-
-
 def _without_interval(cell: Estimate | float | int, column: Column) -> Sequence[str]:
-    if isinstance(cell, Estimate) and (cell.has_interval or _open(cell) or _given(cell)):
+    # A given number is exact and needs no interval.
+    without = (Origin.NOT_DETERMINED, Origin.GIVEN)
+    if isinstance(cell, Estimate) and (cell.has_interval or cell.origin in without):
         return ()
     reason = (cell.reason if isinstance(cell, Estimate) else NONE) or column.reason
     return (str(reason),) if reason else ()
 
 
 def _not_determined(cell: Estimate | float | int, column: Column) -> Sequence[str]:
-    if not isinstance(cell, Estimate) or not _open(cell):
+    if not isinstance(cell, Estimate) or cell.origin is not Origin.NOT_DETERMINED:
         return ()
     reason = cell.reason or column.reason
     return (str(reason),) if reason else ()
@@ -288,15 +278,6 @@ def _contradicted(cell: Estimate | float | int, column: Column) -> Sequence[str]
     return ()
 
 
-def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
-    """Systematic parts of unknown size, which the intervals of a column do not include."""
-    for cell in _numbers(table, column):
-        if isinstance(cell, Estimate) and cell.has_interval:
-            yield from (
-                in_axis_terms(p.source) for p in cell.systematic if p.standard_uncertainty is None
-            )
-
-
 def data_link(text: str) -> str:
     """A CSV text as a `data:` address, for a download without a second file.
 
@@ -305,12 +286,8 @@ def data_link(text: str) -> str:
     return "data:text/csv;charset=utf-8," + quote(text, safe="!$()*+,-./:;=?@_~")
 
 
-def _unit(column: Column) -> str:
-    return column.display or column.unit
-
-
 def _displayed(value: Value, column: Column) -> Value:
-    if isinstance(value, int | float) and not isinstance(value, bool) and column.display:
+    if is_number(value) and column.display:
         return float(convert(float(value), column.unit, column.display))
     return value
 
@@ -320,7 +297,7 @@ def _shown_column(column: Column, rows: Sequence[Mapping[str, Cell]]) -> list[Sh
     cells = [row.get(column.name) for row in rows]
     values = [_displayed(bare(cell), column) for cell in cells]
     given = [value for value in values if value is not None]
-    numbers = [float(v) for v in given if isinstance(v, int | float) and not isinstance(v, bool)]
+    numbers = [float(value) for value in given if is_number(value)]
     right = bool(numbers) and len(numbers) == len(given)
     largest = max((abs(v) for v in numbers if math.isfinite(v)), default=0.0)
 
@@ -369,22 +346,6 @@ def _text(value: Value, negligible: float, decimals: int = 0) -> str:
 
 
 def _csv_name(column: Column) -> str:
-    unit = _unit(column).replace("%", "percent").replace("^", "").replace("/", " per ")
+    unit = column.shown_unit.replace("%", "percent").replace("^", "").replace("/", " per ")
     words = re.findall(r"\w+", f"{column.name} {unit}")
     return "_".join(words)
-
-
-def _exact(value: Value) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(float(value)) if isinstance(value, float) else str(value)
-
-
-def _csv(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(headers)
-    writer.writerows(rows)
-    return text.getvalue()

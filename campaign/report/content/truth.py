@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
@@ -23,9 +22,9 @@ from campaign.physics.bench import Bench
 from campaign.physics.true_values import QUANTITIES, true_of, true_value
 from campaign.physics.truth import simulated
 from campaign.physics.variation import as_it_is, of_its_day
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.written_units import TestUnits
 from campaign.result import Cell, Column, Finding, Table, Value
-from campaign.text import number, path_words, quantity_words
+from campaign.text import capitalized, number, path_words, quantity_words
 from campaign.trial import Tree, Trial, canonical_json
 
 Row = Mapping[str, Cell]
@@ -45,12 +44,12 @@ COUNTED = "counted"
 """Key of a row, not a cell: False for a number that repeats others of the table."""
 
 
-def truth_tables(run: RunReader, tests: Iterable[AnalysedTest]) -> dict[str, Table]:
+def truth_tables(
+    run: RunReader, tests: Iterable[AnalysedTest], units: Mapping[str, TestUnits]
+) -> dict[str, Table]:
     """Table of true values and estimates of the simulated bench, by test."""
     if run.header.backend != SIMULATED:
         return {}
-    tests = tuple(tests)
-    units = units_of(tests, run.header)
     plants = run.header.truth.plants
     tables = {}
     for test in tests:
@@ -86,7 +85,7 @@ class Benches:
         try:
             stated = bench_of(trial)
             return simulated(self.plants[trial.truth], stated) if trial.truth else stated
-        except (LookupError, ValidationError, ValueError):
+        except (LookupError, ValueError):
             return None
 
 
@@ -107,7 +106,7 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
     left_out = dict.fromkeys(why for row, why in pairs if why and row["inside"] != "")
     note = held(rows) or "None of these numbers has an interval"
     note += f"; {' and '.join(left_out)} are not counted." if left_out else "."
-    note += "".join(f" {_capital(each)}." for each in biases(rows))
+    note += "".join(f" {capitalized(each)}." for each in biases(rows))
     if any(trial.truth for trial in trials):
         note += " Plan and analysis were given the stated bench, not this one."
     return Table(
@@ -162,16 +161,17 @@ def _bias(quantity: str, off: Array, source: str) -> str:
     """
     mean, low, high = float(np.mean(off)), float(np.min(off)), float(np.max(off))
     if low > 0 or high < 0:
-        ends = " to ".join(_signed(end) for end in sorted((low, high), key=abs))
+        ends = " to ".join(signed(end) for end in sorted((low, high), key=abs))
         where = f"bias {ends} % ({len(off)} of {len(off)}; exceeds scatter)"
     else:
-        ends = f"{_signed(low)} to {_signed(high)} %"
-        where = f"bias {_signed(mean)} % (mean of {len(off)}, {ends}; exceeds scatter)"
+        ends = f"{signed(low)} to {signed(high)} %"
+        where = f"bias {signed(mean)} % (mean of {len(off)}, {ends}; exceeds scatter)"
     text = f"{quantity}: {where}"
     return f"{text}; largest systematic part: {in_axis_terms(source)}" if source else text
 
 
-def _signed(value: float) -> str:
+def signed(value: float) -> str:
+    """A number with its sign, as text of two digits."""
     return f"+{number(value, 2)}" if value > 0 else number(value, 2)
 
 
@@ -188,7 +188,7 @@ def _deviation(row: Row) -> float | None:
     estimate, true = row["found"], row["true"]
     if not isinstance(estimate, Estimate) or not isinstance(true, float) or not true:
         return None
-    if estimate.kind in ("at least", "at most"):
+    if estimate.is_bound:
         return None
     return None if math.isnan(estimate.value) else 100.0 * (estimate.value - true) / abs(true)
 
@@ -208,10 +208,6 @@ def duplicate_of(finding: Finding, others: Sequence[Finding]) -> str:
     if finding.conditions != free and any(each.conditions == free for each in beside):
         return "fits of the same points with the exponent held"
     return ""
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _row(

@@ -19,8 +19,8 @@ from campaign.physics.bench import Bench
 from campaign.physics.bench_knowledge import number_at
 from campaign.protocol.shapes import Shape, shape_at
 from campaign.report.content.protocol_units import leaves_of, written_units
-from campaign.result import Table
-from campaign.text import number, path_words, pretty_unit
+from campaign.result import Table, is_number
+from campaign.text import capitalized, number, path_words, pretty_unit
 from campaign.units import Quantity, convert
 
 LISTED = 12
@@ -73,7 +73,7 @@ class TestUnits:
         unit = self.of(path)
         if any(isinstance(value, Mapping) for value in values):
             return "; ".join(self._tables(path, values))
-        numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
+        numbers = [value for value in values if is_number(value)]
         ends = [min(numbers), max(numbers)] if len(numbers) == len(values) > LISTED else values
         shown = [_plain(value, unit) for value in ends]
         text = ", ".join(shown)
@@ -94,8 +94,7 @@ class TestUnits:
             set_ = column.exact or column.name in self._swept
             unit = self.of(column.name) if set_ else None
             if column.label == column.name:
-                words = path_words(column.name)
-                column = replace(column, label=words[:1].upper() + words[1:])
+                column = replace(column, label=capitalized(path_words(column.name)))
             if unit is not None and column.unit in ("", unit.si):
                 column = replace(column, unit=unit.si, display=unit.unit)
             columns.append(column)
@@ -147,7 +146,7 @@ class TestUnits:
         for table in self.test.result.tables:
             for column in table.columns:
                 if column.name == path and column.unit:
-                    unit = column.display or column.unit
+                    unit = column.shown_unit
                     return DisplayUnit(column.unit, unit, convert(1.0, unit, column.unit))
         return None
 

@@ -61,8 +61,8 @@ def draw_published(
     """
     drawn = []
     for each in marks:
-        x = _showable(each.x, panel.x, scale_of(panel.x)) + aside * scale_of(panel.x)
-        y = _showable(each.y, panel.y, scale_of(panel.y))
+        x = _showable(each.x, panel.x) + aside * scale_of(panel.x)
+        y = _showable(each.y, panel.y)
         how: dict[str, Any] = {"color": look.light, "zorder": 3}
         if each.joined:  # never pale, or it would be invisible on a fit that coincides with it
             ax.plot(x, y, **{**DOTTED, **how, "color": INK.light})
@@ -120,13 +120,11 @@ def leave_room(ax: Axes, bounds: Array) -> None:
         ax.set_ylim(top=max(high, float(known.max()) + HEADROOM * (high - low)))
 
 
-def prepared(
-    curve: Curve, panel: Panel, scale_x: float, scale_y: float
-) -> tuple[Array, Array, Array | None]:
+def prepared(curve: Curve, panel: Panel) -> tuple[Array, Array, Array | None]:
     """Coordinates in display units; values that a logarithmic axis cannot show become gaps."""
-    x = _showable(curve.x, panel.x, scale_x)
-    y = _showable(curve.y, panel.y, scale_y)
-    low = None if curve.y_low is None else _showable(curve.y_low, panel.y, scale_y)
+    x = _showable(curve.x, panel.x)
+    y = _showable(curve.y, panel.y)
+    low = None if curve.y_low is None else _showable(curve.y_low, panel.y)
     count = min(len(x), len(y)) if low is None else min(len(x), len(y), len(low))
     x, y = x[:count], np.where(np.isfinite(x[:count]), y[:count], np.nan)
     return x, y, None if low is None else low[:count]
@@ -134,7 +132,7 @@ def prepared(
 
 def drawn_points(curve: Curve, panel: Panel, points: int) -> tuple[Array, Array, Array | None]:
     """Drawn x, y and lower edge of a curve: display units, shape (n,), lines decimated."""
-    x, y, y_low = prepared(curve, panel, scale_of(panel.x), scale_of(panel.y))
+    x, y, y_low = prepared(curve, panel)
     if curve.style in ("points", "band"):
         return x, y, y_low
     return *decimate(x, y, points), None
@@ -142,13 +140,13 @@ def drawn_points(curve: Curve, panel: Panel, points: int) -> tuple[Array, Array,
 
 def drawn_interval(curve: Curve, panel: Panel) -> tuple[Array, Array, Array] | None:
     """Drawn x, low and high of a curve's 95 % interval: display units, (n,); None without one."""
-    x, y, _ = prepared(curve, panel, scale_of(panel.x), scale_of(panel.y))
+    x, y, _ = prepared(curve, panel)
     ends = interval_of(curve, panel, y)
     return None if ends is None else (x, *ends)
 
 
-def _showable(values: Array, axis: Axis, scale: float) -> Array:
-    shown = np.asarray(values, dtype=float).ravel() * scale
+def _showable(values: Array, axis: Axis) -> Array:
+    shown = np.asarray(values, dtype=float).ravel() * scale_of(axis)
     shown = np.where(np.isfinite(shown), shown, np.nan)
     return np.where(shown > 0, shown, np.nan) if axis.scale == "log" else shown
 
@@ -179,8 +177,7 @@ def interval_of(curve: Curve, panel: Panel, y: Array) -> tuple[Array, Array] | N
     """
     if curve.low is None or curve.high is None:
         return None
-    scale = scale_of(panel.y)
-    low, high = (_showable(end, panel.y, scale)[: len(y)] for end in (curve.low, curve.high))
+    low, high = (_showable(end, panel.y)[: len(y)] for end in (curve.low, curve.high))
     if panel.y.scale == "log":
         given = np.isfinite(np.asarray(curve.low, dtype=float).ravel()[: len(y)])
         low = np.where(np.isnan(low) & given, OUT_OF_SIGHT * y, low)
@@ -279,4 +276,4 @@ def spare_rounding_errors(ax: Axes, values: Sequence[Array]) -> None:
 
 def scale_of(axis: Axis) -> float:
     """Factor from the axis' unit to its display unit."""
-    return factor(axis.unit, axis.display) if axis.display and axis.display != axis.unit else 1.0
+    return 1.0 if axis.shown_unit == axis.unit else factor(axis.unit, axis.shown_unit)

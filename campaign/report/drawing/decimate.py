@@ -28,8 +28,6 @@ def decimate(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
     first, last, lowest and highest sample), so that the picture is the same. A segment without a
     finite point remains a gap.
     """
-    if len(x) <= points:
-        return x, y
     keep = kept(x, y, points)
     return x[keep], y[keep]
 
@@ -41,18 +39,11 @@ def kept(x: Array, y: Array, points: int) -> NDArray[np.intp]:
     edges = np.linspace(0, len(x), max(points // 4, 1) + 1).astype(int)
     starts, lengths = edges[:-1], np.diff(edges)
     finite = np.isfinite(x) & np.isfinite(y)
-    lowest = [np.where(finite, values, np.inf) for values in (x, y)]
-    highest = [np.where(finite, values, -np.inf) for values in (x, y)]
-    picks = [
-        *(
-            _first(values, np.minimum.reduceat(values, starts), starts, lengths)
-            for values in lowest
-        ),
-        *(
-            _first(values, np.maximum.reduceat(values, starts), starts, lengths)
-            for values in highest
-        ),
-    ]
+    picks = []
+    for values in (x, y):
+        for extreme, blank in ((np.minimum, np.inf), (np.maximum, -np.inf)):
+            known = np.where(finite, values, blank)
+            picks.append(_first(known, extreme.reduceat(known, starts), starts, lengths))
     return np.unique(np.concatenate(picks))
 
 

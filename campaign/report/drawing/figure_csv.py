@@ -33,7 +33,7 @@ def figure_csv(figure: Figure) -> str:
     points = points_of_each(figure)
     titles = _names([panel.title for panel in figure.panels])
     for panel, title in zip(figure.panels, titles, strict=True):
-        units = _unit(panel.x), _unit(panel.y)
+        units = panel.x.shown_unit, panel.y.shown_unit
         names = _names([curve.label or curve.series for curve in panel.curves])
         for curve, name in zip(panel.curves, names, strict=True):
             before, behind = _quoted(title, name), _quoted(*units)
@@ -76,11 +76,7 @@ def _names(titles: list[str]) -> list[str]:
 
 def _displayed(values: Array, axis: Axis) -> Array:
     shown = np.asarray(values, dtype=float).ravel()
-    return np.asarray(convert(shown, axis.unit, axis.display or axis.unit), dtype=float)
-
-
-def _unit(axis: Axis) -> str:
-    return axis.display or axis.unit
+    return np.asarray(convert(shown, axis.unit, axis.shown_unit), dtype=float)
 
 
 def _texts(values: Array) -> Iterable[str]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.report.drawing.canvas import TITLE, TITLE_PAD, WIDTH, canvas, place_axes, to_svg
+from campaign.report.drawing.canvas import TITLE, WIDTH, canvas, place_axes, to_svg
 from campaign.report.drawing.curves import (
     draw_bar,
     draw_bounds,
@@ -237,8 +237,7 @@ def _draw_panel(
     points: int,
     published: Mapping[int, Sequence[PublishedMarks]],
 ) -> _Drawn:
-    scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
-    shown = [prepared(curve, panel, scale_x, scale_y) for curve in panel.curves]
+    shown = [prepared(curve, panel) for curve in panel.curves]
     intervals = [
         interval_of(curve, panel, y) for curve, (_, y, _) in zip(panel.curves, shown, strict=True)
     ]
@@ -246,7 +245,7 @@ def _draw_panel(
     bounds: list[Array] = []
     for number, curve in enumerate(panel.curves):
         look, (x, y, y_low), ends = chosen[series_name(curve)], shown[number], intervals[number]
-        x = x + curve.aside * scale_x
+        x = x + curve.aside * scale_of(panel.x)
         if ends is not None:
             draw_interval(ax, curve, ends, look, x, y, points)
         if panel.x.places and panel.y.scale == "linear" and (panel.y.limits or (None,))[0] == 0.0:
@@ -266,7 +265,7 @@ def _draw_panel(
     limit_intervals(ax, np.concatenate([np.empty(0), *drawn]), ends_shown)
     if panel.y.scale == "linear":
         spare_rounding_errors(ax, [*drawn, *(end for ends in ends_shown for end in ends)])
-    _limit_axes(ax, panel, scale_x, scale_y)
+    _limit_axes(ax, panel)
     if panel.x.places and panel.x.limits is None:
         ax.margins(x=BESIDE)
     if any(mark.point for mark in panel.marks) and panel.y.limits is None:
@@ -290,13 +289,12 @@ def _share_scales(sets: Sequence[_Drawn]) -> None:
 def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]) -> PanelMarks:
     """Draw ticks, marks, and the note of an empty panel, after its limits are known."""
     ax, panel = drawn.ax, drawn.panel
-    scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
     _label_axes(ax, panel, room)
-    marked = PanelMarks(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
+    marked = PanelMarks(ax, panel, chosen)
     draw_marks(marked)  # marks may widen the limits
     number = max(NUMBER, LETTER * decade_letters(ax.get_xlim()) + GAP)
-    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / number))
-    set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
+    set_ticks(ax.xaxis, panel.x, drawn.x, int(room[0] / number))
+    set_ticks(ax.yaxis, panel.y, drawn.y, int(room[1] / LINE))
     thin_out(ax.xaxis, lambda letters: int(room[0] / (LETTER * letters + GAP)))
     if _turned(panel, room[0]):
         names = [name.replace("-\n", "-").replace("\n", " ") for _, name in panel.x.places]
@@ -312,9 +310,9 @@ def _label_axes(ax: Axes, panel: Panel, room: tuple[float, float]) -> None:
         name(fill(axis_label(axis), max(12, int(long / LETTER)), break_long_words=False))
 
 
-def _limit_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
-    limits = ((ax.set_xlim, panel.x, scale_x), (ax.set_ylim, panel.y, scale_y))
-    for set_limits, axis, scale in limits:
+def _limit_axes(ax: Axes, panel: Panel) -> None:
+    for set_limits, axis in ((ax.set_xlim, panel.x), (ax.set_ylim, panel.y)):
+        scale = scale_of(axis)
         if axis.limits is not None:
             ends = (end * scale if np.isfinite(end) else None for end in axis.limits)
             set_limits(*ends)
@@ -322,7 +320,7 @@ def _limit_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
 
 def axis_label(axis: Axis) -> str:
     """`label (unit)` in the display unit; an axis of named places has no unit."""
-    unit = "" if axis.places else axis.display or axis.unit
+    unit = "" if axis.places else axis.shown_unit
     if unit and axis.label.endswith(")"):
         return f"{axis.label[:-1]}, {pretty_unit(unit)})"
     return f"{axis.label} ({pretty_unit(unit)})" if unit else axis.label

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from campaign.report.drawing.canvas import TITLE_PAD
+from campaign.report.drawing.curves import scale_of
 from campaign.report.palette import MUTED, Look
-from campaign.result import Mark
+from campaign.result import Mark, Panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,11 +52,8 @@ class PanelMarks:
     """
 
     ax: Axes
-    marks: Sequence[Mark]
-    scale_x: float
-    scale_y: float
+    panel: Panel
     chosen: Mapping[str, Look]
-    title_pad: float
     above: list[Annotation] = field(default_factory=list)
     beside: list[Annotation] = field(default_factory=list)
     inside: list[Annotation] = field(default_factory=list)
@@ -67,9 +66,9 @@ class PanelMarks:
 def draw_marks(marked: PanelMarks) -> None:
     """Draw lines, stretches and dots, and collect labels for `place_labels`."""
     ax = marked.ax
-    for mark in marked.marks:
-        x = None if mark.x is None else mark.x * marked.scale_x
-        y = None if mark.y is None else mark.y * marked.scale_y
+    for mark in marked.panel.marks:
+        x = None if mark.x is None else mark.x * scale_of(marked.panel.x)
+        y = None if mark.y is None else mark.y * scale_of(marked.panel.y)
         if not all(math.isfinite(each) for each in (x, y) if each is not None):
             continue
         colour = marked.colour(mark)
@@ -77,7 +76,7 @@ def draw_marks(marked: PanelMarks) -> None:
             ax.plot([x], [y], "o", color=colour, markersize=4.5, zorder=3.5)
             marked.points.append((x, y, mark.label, colour))
         elif mark.until is not None and math.isfinite(mark.until):
-            _stretch(marked, mark, x, y, colour)
+            _stretch(marked, mark.until, mark.label, x, y, colour)
         else:
             line: dict[str, Any] = {"color": colour, "linewidth": 0.8, "dashes": (3, 2)}
             if x is not None:
@@ -89,17 +88,19 @@ def draw_marks(marked: PanelMarks) -> None:
                     _beside(marked, y, mark.label, colour)
 
 
-def _stretch(marked: PanelMarks, mark: Mark, x: float | None, y: float | None, colour: str) -> None:
-    assert mark.until is not None  # noqa: S101 (for the type checker; the caller looked)
+def _stretch(
+    marked: PanelMarks, until: float, label: str, x: float | None, y: float | None, colour: str
+) -> None:
+    """Shade from `x` or `y` (display units) to `until` (unit of the axis), with a label."""
     shade: dict[str, Any] = {"color": colour, "alpha": 0.13, "linewidth": 0, "zorder": 0.5}
     if x is not None:
-        until = mark.until * marked.scale_x
+        until *= scale_of(marked.panel.x)
         marked.ax.axvspan(x, until, **shade)
-        _above(marked, _middle(x, until, marked.ax.get_xscale()), mark.label, colour)
+        _above(marked, _middle(x, until, marked.ax.get_xscale()), label, colour)
     elif y is not None:
-        until = mark.until * marked.scale_y
+        until *= scale_of(marked.panel.y)
         marked.ax.axhspan(y, until, **shade)
-        _beside(marked, _middle(y, until, marked.ax.get_yscale()), mark.label, colour)
+        _beside(marked, _middle(y, until, marked.ax.get_yscale()), label, colour)
 
 
 def _middle(one: float, other: float, scale: str) -> float:
@@ -189,7 +190,7 @@ def _stack_above(sheet: Canvas, marked: PanelMarks) -> None:
         ends[row : row + 1] = [right]
         text.set_position((shift / per_point, GAP + row * ROW))
     if ends and marked.ax.get_title(loc="left"):
-        pad = marked.title_pad + len(ends) * ROW
+        pad = TITLE_PAD + len(ends) * ROW
         marked.ax.set_title(marked.ax.get_title(loc="left"), pad=pad)
 
 

@@ -7,7 +7,6 @@ curve is drawn.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, product
@@ -15,8 +14,7 @@ from itertools import groupby, product
 import numpy as np
 
 from campaign.published.values import Cell, Published, PublishedTable
-from campaign.result import Array, Curve, Figure, Panel, Value, same_value
-from campaign.units import convert
+from campaign.result import Array, Curve, Figure, Panel, Value, is_number, meets
 
 DRAWN = ("equal", "near")
 """Relations of a cell that is a value ..."""
@@ -97,7 +95,7 @@ class PublishedBeside:
             for cell in table.cells
             if cell.quantity == curve.quantity and bool(cell.status) is doubtful
             if (x := _along(curve, cell)) is not None and self._agree(curve, cell, relations)
-            if (y := _value(cell, panel.y.unit)) is not None
+            if (y := cell.in_unit(panel.y.unit)) is not None
         ]
         if points:
             xs, ys, headings = zip(*points, strict=True)
@@ -114,7 +112,7 @@ class PublishedBeside:
                 for cell in table.cells
                 if cell.quantity in curve.parameters and self._agree(curve, cell)
             ]
-            values = {c.quantity: _value(c, curve.parameters[c.quantity]) for c in cells}
+            values = {c.quantity: c.in_unit(curve.parameters[c.quantity]) for c in cells}
             known = {name: value for name, value in values.items() if value is not None}
             complete = len(known) == len(cells) == len(curve.parameters) > 0
             if complete and any(cell.status for cell in cells) is doubtful and curve.law:
@@ -123,12 +121,9 @@ class PublishedBeside:
 
     def _agree(self, curve: Curve, cell: Cell, relations: Sequence[str] = DRAWN) -> bool:
         """Whether the curve states all conditions of a cell, except the one along x."""
+        wanted = {name: value for name, value in cell.conditions.items() if name != curve.along}
         stated = {**self.known, **curve.conditions}
-        return cell.relation in relations and all(
-            name in stated and same_value(stated[name], value)
-            for name, value in cell.conditions.items()
-            if name != curve.along
-        )
+        return cell.relation in relations and meets(stated, wanted)
 
 
 def _along(curve: Curve, cell: Cell) -> float | None:
@@ -136,16 +131,7 @@ def _along(curve: Curve, cell: Cell) -> float | None:
     if not curve.along:
         return float(curve.x[0]) if len(curve.x) == 1 else None
     x = cell.conditions.get(curve.along)
-    return float(x) if isinstance(x, int | float) and not isinstance(x, bool) else None
-
-
-def _value(cell: Cell, unit: str) -> float | None:
-    """Value of a cell in `unit`; None for an incompatible unit or a value that is not finite."""
-    try:
-        value = float(convert(cell.value, cell.unit, unit))
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+    return float(x) if is_number(x) else None
 
 
 def _range(x: Array) -> Array:

@@ -29,7 +29,7 @@ from campaign.report.drawing.rows import (
     zero_line,
 )
 from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS, Look
-from campaign.text import percent
+from campaign.text import capitalized, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,7 +100,7 @@ def draw_overview(scoreboard: Scoreboard) -> str | None:
 
 def _row(name: str, lines: tuple[Line, ...]) -> Row:
     heading = name if " " in name else f"Table {name}"
-    return Row(heading[:1].upper() + heading[1:], lines)
+    return Row(capitalized(heading), lines)
 
 
 def _few(rows: list[Row], most: int) -> list[Row]:

@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 CURVES = 10
 """Rounding of coordinates in parts of a point: a fifth of a pixel on the widest page ..."""
 SIGNS = 100
 """... and of a sign, which is round only with finer coordinates."""
-Whole = NDArray[np.int64]
 
 
 def short_path(text: str, parts: int = CURVES) -> str:

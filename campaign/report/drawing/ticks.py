@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.report.drawing.curves import scale_of
 from campaign.result import Axis
 from campaign.text import number
 
@@ -28,17 +29,10 @@ WIDE_ANGLE = 20.0
 """Minimum span of an axis with these steps (deg); a shorter axis has plain steps."""
 
 
-def set_ticks(
-    drawn: DrawnAxis,
-    axis: Axis,
-    values: Sequence[Array],
-    scale: float,
-    decades: int = MOST_DECADES,
-) -> None:
+def set_ticks(drawn: DrawnAxis, axis: Axis, values: Sequence[Array], decades: int) -> None:
     """Set the ticks of an axis; call it after its limits are set.
 
     values: all drawn values along this axis, in display units.
-    scale: factor from the axis' unit to its display unit.
     decades: maximum number of labels of a logarithmic axis.
     """
     from matplotlib.ticker import (
@@ -50,7 +44,7 @@ def set_ticks(
     )
 
     if axis.places:
-        drawn.set_ticks([place * scale for place, _ in axis.places])
+        drawn.set_ticks([place * scale_of(axis) for place, _ in axis.places])
         drawn.set_ticklabels([name for _, name in axis.places])
         drawn.set_minor_locator(FixedLocator([]))
         return
@@ -65,7 +59,7 @@ def set_ticks(
     if _counts(axis, values):
         drawn.set_major_locator(MaxNLocator(nbins=10, integer=True))
         drawn.set_minor_locator(AutoMinorLocator(1))
-    elif (axis.display or axis.unit) == "deg" and high - low >= WIDE_ANGLE:
+    elif axis.shown_unit == "deg" and high - low >= WIDE_ANGLE:
         steps = [step for step in TURN if high - low <= MOST_STEPS * step]
         drawn.set_major_locator(MultipleLocator(steps[0]) if steps else MaxNLocator(nbins=8))
 
@@ -128,7 +122,7 @@ def _counts(axis: Axis, values: Sequence[Array]) -> bool:
     shown = [each[np.isfinite(each)] for each in values]
     total = sum(each.size for each in shown)
     whole = all(bool(np.all(each == np.round(each))) for each in shown)
-    return not (axis.display or axis.unit) and total > 0 and whole
+    return not axis.shown_unit and total > 0 and whole
 
 
 def _plain(value: float, position: Any) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
+from campaign.estimate import Window
 from campaign.report.drawing.decimate import decimate
 from campaign.report.palette import Look
 from campaign.text import number
@@ -45,20 +46,11 @@ class Trace:
     look: Look
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """A shaded part of the time axis (s)."""
-
-    label: str
-    start: float
-    stop: float
-
-
 def draw_traces(
     time: Array,
     traces: Sequence[Trace],
     axis: str,
-    windows: Sequence[Stretch] = (),
+    windows: Sequence[Window] = (),
     moments: Sequence[tuple[float, str]] = (),
 ) -> Markup:
     """Draw one chart as an SVG element within a page.
@@ -175,12 +167,12 @@ def _stroke(look: Look) -> str:
     return f'fill="none" stroke="var(--{look.name})" stroke-width="1.3"{dash}'
 
 
-def _shade(window: Stretch, x: _Scale) -> str:
+def _shade(window: Window, x: _Scale) -> str:
     start, stop = (x.pixel(min(max(at, x.low), x.high)) for at in (window.start, window.stop))
     span = f"{number(window.start)} to {number(window.stop)} s"
     return (
         f'<rect class="window" x="{start:.1f}" y="{TOP:g}" width="{max(stop - start, 0):.1f}"'
-        f' height="{HEIGHT - BOTTOM - TOP:g}"><title>{escape(window.label)}: {span}</title></rect>'
+        f' height="{HEIGHT - BOTTOM - TOP:g}"><title>{escape(window.name)}: {span}</title></rect>'
     )
 
 

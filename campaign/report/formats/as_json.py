@@ -34,16 +34,6 @@ DIGITS = 7
 """Digits of the numbers of a curve."""
 
 
-def report_json(layout: Layout) -> str:
-    """Text of `report.json`, deterministic."""
-    return _text(report_data(layout))
-
-
-def article_json(article: Article) -> str:
-    """JSON text of a comparison, trends or an identification."""
-    return _text(article_data(article))
-
-
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -58,9 +48,9 @@ def _as(model: type[M], /, *sources: object, **more: Any) -> M:
     return model.model_validate(fields | more)
 
 
-def article_data(article: Article) -> data.ArticleData:
-    """An article as data."""
-    return data.ArticleData(
+def article_json(article: Article) -> str:
+    """JSON text of a comparison, trends or an identification."""
+    page = data.ArticleData(
         kind=article.kind.lower(),
         program=f"campaign {__version__}",
         command=article.command,
@@ -72,6 +62,7 @@ def article_data(article: Article) -> data.ArticleData:
         sections=tuple(map(_part, article.parts)),
         content=plain(article.content),
     )
+    return _text(page)
 
 
 def _part(part: Part) -> data.Section:
@@ -114,10 +105,10 @@ def report_schema() -> dict[str, Any]:
     return TypeAdapter(data.ReportData | data.ArticleData).json_schema()
 
 
-def report_data(layout: Layout) -> data.ReportData:
-    """A report as data."""
+def report_json(layout: Layout) -> str:
+    """Text of `report.json`, deterministic."""
     document = layout.document
-    return data.ReportData(
+    page = data.ReportData(
         run=_run(document),
         opening=document.opening,
         scoreboard=_scoreboard(layout),
@@ -131,6 +122,7 @@ def report_data(layout: Layout) -> data.ReportData:
         damaged=tuple(in_words(damage) for damage in document.damaged),
         provenance=_provenance(document),
     )
+    return _text(page)
 
 
 def number(estimate: Estimate) -> data.Number:
@@ -345,6 +337,6 @@ def _provenance(document: Document) -> data.Provenance:
 
 def _display(shown: result.Column | result.Axis) -> dict[str, Any]:
     """Display unit, and the factor that converts a number to it."""
-    display = shown.display or shown.unit
-    same = display == shown.unit
-    return {"display": display, "factor": 1.0 if same else float(factor(shown.unit, display))}
+    same = shown.shown_unit == shown.unit
+    scale = 1.0 if same else float(factor(shown.unit, shown.shown_unit))
+    return {"display": shown.shown_unit, "factor": scale}

@@ -11,10 +11,6 @@ if TYPE_CHECKING:
     from campaign.report.page.pieces import Piece
 
 
-def _nothing() -> None:
-    """Require nothing."""
-
-
 @dataclass(frozen=True)
 class WrittenPage:
     """A report or another page whose HTML, tables and figures are already written.
@@ -49,5 +45,5 @@ class Format:
     name: str
     summary: str
     write: Callable[[WrittenPage], None]
-    require: Callable[[], None] = _nothing
+    require: Callable[[], None] = lambda: None
     pdf_figures: bool = False

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from campaign.report.content import lines
 from campaign.report.content.citation import citation_of
-from campaign.report.content.document import Document
+from campaign.report.content.document import FAILED, Document
 from campaign.report.content.first_screen import Answer
 from campaign.report.content.lines import ShownLine
 from campaign.report.page.damage_notice import Notice
@@ -21,9 +21,6 @@ from campaign.report.page.pieces import (
     Piece,
     Source,
 )
-
-FAILED = 200
-"""Maximum number of listed failed trials; the archive has all."""
 
 
 def outline(layout: Layout, damage: Notice | None) -> Iterator[Piece]:
@@ -230,9 +227,7 @@ def _failed(document: Document) -> Iterator[Piece]:
                 )
                 for each in failed[:FAILED]
             ),
-            tuple(_counted(len(failed) - FAILED, "more are in the archive."))
-            if len(failed) > FAILED
-            else (),
+            tuple(_counted(max(0, len(failed) - FAILED), "more are in the archive.")),
         )
 
 

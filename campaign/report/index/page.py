@@ -42,16 +42,16 @@ class Entry:
     """
 
     name: str
-    title: str
-    when: str
-    tests: tuple[str, ...]
-    benches: tuple[str, ...]
     status: str
     state: str
-    verdict: tuple[str, ...]
-    backend: str
-    operator: str
-    tags: tuple[str, ...]
+    title: str = ""
+    when: str = ""
+    tests: tuple[str, ...] = ()
+    benches: tuple[str, ...] = ()
+    verdict: tuple[str, ...] = ()
+    backend: str = ""
+    operator: str = ""
+    tags: tuple[str, ...] = ()
     link: str = ""
     thumbnail: str = ""
     caption: str = ""
@@ -108,11 +108,15 @@ def entry_of(run: RunSummary) -> Entry:
         thumbnail = _address(report.figure, run.path.parent)
     if run.problem:
         problem = run.problem.replace(str(run.path.parent) + os.sep, "")
-        blank: tuple[str, ...] = ()
         return Entry(
-            run.name, "", "", blank, blank, "damaged", "damaged", blank, "", "", blank,
-            link, thumbnail, report.caption, problem,
-        )  # fmt: skip
+            name=run.name,
+            status="damaged",
+            state="damaged",
+            link=link,
+            thumbnail=thumbnail,
+            caption=report.caption,
+            problem=problem,
+        )
     return Entry(
         name=run.name,
         title=run.title or run.protocol or run.name,

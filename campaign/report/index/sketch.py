@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from campaign.report.drawing.decimate import decimate
 from campaign.report.palette import looks
+from campaign.result import is_number
 
 WIDTH, HEIGHT, EDGE = 240, 135, 9
 CURVES = 12
@@ -53,7 +54,7 @@ def _curves(panel: Mapping[str, Any]) -> Iterator[Series]:
 def _numbers(values: object, axis: object) -> Array:
     """Coordinates along an axis; NaN for values without one."""
     items = values if isinstance(values, list) else []
-    plain = [v if isinstance(v, int | float) and not isinstance(v, bool) else None for v in items]
+    plain = [item if is_number(item) else None for item in items]
     try:
         places = np.array(plain, dtype=float)
     except OverflowError:  # an integer beyond the range of floats

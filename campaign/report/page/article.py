@@ -12,6 +12,7 @@ from campaign.report.page.folder import Folder, ShownFigure
 from campaign.report.page.pieces import Facts, Heading, Items, Paragraph, Piece
 from campaign.report.palette import Look
 from campaign.result import Figure
+from campaign.text import count
 
 T = TypeVar("T")
 
@@ -36,7 +37,6 @@ class Article:
     """A page: title, facts and sections in order.
 
     Attributes:
-        name: name of its files, without suffix.
         kind: kind of page, in a word.
         command: command that writes it.
         facts: groups of facts, with a letter if there are several.
@@ -44,7 +44,6 @@ class Article:
         content: data for its JSON file only.
     """
 
-    name: str
     kind: str
     command: str
     title: str
@@ -97,7 +96,7 @@ class PageParts:
 
 def damage_text(what: str, damaged: Sequence[object]) -> str:
     """Sentence on the damage of an archive and its effect."""
-    places = f"{len(damaged)} place{'s' if len(damaged) > 1 else ''}"
+    places = count(len(damaged), "place")
     return f"{what}: the archive is damaged in {places}; what cannot be read takes no part."
 
 

@@ -163,8 +163,9 @@ class Folder:
 
     def table(self, text: str, *candidates: str) -> Download:
         """Add a CSV file; return its download."""
-        file = f"tables/{self.table_names.unique(*candidates)}.csv"
-        text = on_a_page(text)
+        return self._csv(f"tables/{self.table_names.unique(*candidates)}.csv", on_a_page(text))
+
+    def _csv(self, file: str, text: str) -> Download:
         self.files[file] = text
         return Download(file, tables.data_link(text) if len(text) <= LINKED else file)
 
@@ -181,17 +182,13 @@ class Folder:
         """Add an SVG file, and a CSV file of its numbers; return the numbered figure."""
         alt = figure.alt or figure.caption
         shown = self.picture(drawn, figure.title, figure.caption, alt, *names, command=command)
-        file = shown.file.removesuffix(".svg") + ".csv"
-        self.files[file] = drawn.csv
-        href = tables.data_link(drawn.csv) if len(drawn.csv) <= LINKED else file
-        download = Download(file, href)
         return replace(
             shown,
             published=published,
             data=figure,
             trials=of_trials(trials),
             trial_numbers=trials,
-            download=download,
+            download=self._csv(shown.file.removesuffix(".svg") + ".csv", drawn.csv),
             looks=looks,
         )
 
@@ -207,16 +204,15 @@ class Folder:
         """Add an SVG file of a picture that is not from an analysis; return the numbered figure."""
         from markupsafe import Markup
 
-        svg = drawn.svg
         name = self.figure_names.unique(*names)
         file = f"figures/{name}.svg"
-        self.files[file] = svg
+        self.files[file] = drawn.svg
         pdf = taken()
         if pdf is not None:
             self.pdfs[f"figures/{name}.pdf"] = pdf
         self.figures += 1
         anchor = f"figure-{self.figures}"
-        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (`inline` escapes texts)
+        markup = Markup(inline(drawn.svg, anchor, title, alt))  # noqa: S704 (`inline` escapes texts)
         return ShownFigure(
             self.figures,
             anchor,

@@ -63,14 +63,10 @@ def interactive(figures: Iterable[ShownFigure]) -> Interactive:
         if each.data and zooms(each.data)
     }
     data = json.dumps(zoomed, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    script = f"{_vendored('uPlot.iife.min.js')}\n{_text('interactive.js')}"
-    style = f"{_vendored('uPlot.min.css')}\n{_text('interactive.css')}"
+    script = f"{_text('vendor/uPlot.iife.min.js')}\n{_text('interactive.js')}"
+    style = f"{_text('vendor/uPlot.min.css')}\n{_text('interactive.css')}"
     text = Markup(html.escape(data, quote=False))  # noqa: S704 (escaped)
     return Interactive(Markup(style), text, Markup(script))  # noqa: S704 (packaged files)
-
-
-def _vendored(name: str) -> str:
-    return (HERE / "vendor" / name).read_text(encoding="utf-8").strip()
 
 
 def _text(name: str) -> str:

@@ -21,7 +21,7 @@ from campaign.report.content.published_columns import as_compared, with_publishe
 from campaign.report.content.references import ReferenceComparison
 from campaign.report.content.run_problems import without_trials
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
-from campaign.report.content.written_units import TestUnits, units_of
+from campaign.report.content.written_units import TestUnits
 from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.page.article import PageParts
 from campaign.report.page.drawings import (
@@ -159,8 +159,11 @@ def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str
     closeness = None if close is None else folder.shown_table(close, (), close.key)
     sections = _sections(document, makers)
     happened = document.incidents
-    figures = tuple(_of_incident(figure, folder, command) for figure in happened.figures)
-    shown = tuple(_table_of_incident(table, folder) for table in happened.tables)
+    figures = tuple(
+        folder.figure(each, Drawing(each).made(), (), f"incidents-{each.key}", command=command)
+        for each in happened.figures
+    )
+    shown = tuple(folder.shown_table(each, (), f"incidents-{each.key}") for each in happened.tables)
     problems = (
         *without_trials(document.run, document.tests),
         *(f"{s.test.name}: {p}" for s in sections for p in _problems(s)),
@@ -200,14 +203,13 @@ def _makers(
     drawn: Drawn,
 ) -> Mapping[str, _Maker]:
     """Maker of figures and tables, by test."""
-    units, again = units_of(document.tests, document.run.header), f"{command} --only-figure"
     return {
         test.name: _Maker(
             folder=folder,
             problems=[test.problem] if test.problem else [],
             test=test,
-            units=units[test.name],
-            command=again,
+            units=document.units[test.name],
+            command=f"{command} --only-figure",
             drawings=drawings,
             awaited=drawn,
             published=document.published,
@@ -230,26 +232,12 @@ def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section
     """Sections in the protocol's order; each published table is in that of its first test."""
     used: set[str] = set()
     sections = []
-    published = document.published
     for place, test in enumerate(document.tests, start=1):
-        own = [n for n in published if n in test.reproduces and n not in used]
-        used.update(own)
-        tables_ = [published[n] for n in own]
-        stated = document.references.stated.get(test.name)
-        files = document.references.files.get(test.name, ())
-        expected = document.truths.get(test.name), (stated, *files)
-        sections.append(_section(place, makers[test.name], document.scoreboard, tables_, expected))
+        names = [n for n in document.published if n in test.reproduces and n not in used]
+        used.update(names)
+        own = [document.published[name] for name in names]
+        sections.append(_section(place, makers[test.name], document, own))
     return tuple(sections)
-
-
-def _of_incident(figure: Figure, folder: Folder, command: str) -> ShownFigure:
-    return folder.figure(
-        figure, Drawing(figure).made(), (), f"incidents-{figure.key}", command=command
-    )
-
-
-def _table_of_incident(table: Table, folder: Folder) -> ShownTable:
-    return folder.shown_table(table, (), f"incidents-{table.key}")
 
 
 def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
@@ -258,10 +246,6 @@ def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
     if scoreboard.further:
         folder.table(to_csv(scoreboard.further, (*COLUMNS, "test")), "scoreboard-runs")
     return download
-
-
-Expected = tuple[Table | None, Sequence[ReferenceComparison | None]]
-"""True values of a test, and its references: the bench file first."""
 
 
 def _changes(compared: ReferenceComparison, maker: _Maker) -> ShownFigure | None:
@@ -273,21 +257,18 @@ def _changes(compared: ReferenceComparison, maker: _Maker) -> ShownFigure | None
 
 
 def _section(
-    place: int,
-    maker: _Maker,
-    scoreboard: Scoreboard,
-    published: Sequence[PublishedTable],
-    expected: Expected,
+    place: int, maker: _Maker, document: Document, published: Sequence[PublishedTable]
 ) -> Section:
-    test, folder = maker.test, maker.folder
+    """Section of a test; `published`: tables that are compared in this section."""
+    test, scoreboard, folder = maker.test, document.scoreboard, maker.folder
     left_out = tuple(_left_out(test))
-    truth, references = expected
+    truth, stated = document.truths.get(test.name), document.references.stated.get(test.name)
+    files = document.references.files.get(test.name, ())
     with axis_terms(test.sides):
         comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
-        prediction, *others = (
-            None if each is None else maker.table(each.table) for each in references
-        )
-        changes = [_changes(each, maker) for each in references if each is not None]
+        prediction = None if stated is None else maker.table(stated.table)
+        references = [maker.table(each.table) for each in files]
+        changes = [_changes(each, maker) for each in (stated, *files) if each is not None]
         figures = [
             maker.attempt(each.key, partial(maker.figure, each)) for each in test.result.figures
         ]
@@ -305,7 +286,7 @@ def _section(
             left_out=left_out,
             truth=None if truth is None else maker.table(truth),
             prediction=prediction,
-            references=tuple(filter(None, others)),
+            references=tuple(references),
             summary=summary_of(test),
         )
 

@@ -8,8 +8,6 @@ from collections.abc import Callable, Collection, Sequence
 FOLDER = "trials"
 """Subfolder of the report's folder with the pages of trials."""
 
-TrialLink = Callable[[int], str | None]
-
 
 class Names:
     """Generator of unique names."""
@@ -47,7 +45,7 @@ def trial_file(number: int) -> str:
     return f"{FOLDER}/trial-{number:05d}.html"
 
 
-def trial_links(written: Collection[int]) -> TrialLink:
+def trial_links(written: Collection[int]) -> Callable[[int], str | None]:
     """Function from a trial's number to the link from the report's page; None without a page.
 
     `written`: numbers of the trials with a page.

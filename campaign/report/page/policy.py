@@ -10,10 +10,9 @@ LOOKS = ("style-src 'unsafe-inline'", "img-src data:")
 """Permits the page's style sheet, styles in figures, and images of dense scatters."""
 
 
-def policy(*scripts: str) -> str:
-    """Policy of a page that permits exactly these scripts; none by default."""
-    allowed = " ".join(f"'{hashed(script)}'" for script in scripts)
-    return "; ".join([*NOTHING, *LOOKS, *([f"script-src {allowed}"] if scripts else [])])
+def policy(script: str) -> str:
+    """Policy of a page that permits exactly this script."""
+    return "; ".join([*NOTHING, *LOOKS, f"script-src '{hashed(script)}'"])
 
 
 def hashed(text: str) -> str:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from campaign.archive.reading.damage_words import in_words
 from campaign.channels import RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.estimate import Window
 from campaign.estimation.relative_rate import relative_rate
 from campaign.recording import Channel, Recording
 from campaign.report.content import tables
 from campaign.report.content.trial_account import TrialAccount, account_of, lost_account
 from campaign.report.drawing.drawing_files import LEGIBLE
-from campaign.report.drawing.traces import FONT, WIDTH, Stretch, Trace, draw_traces, key
+from campaign.report.drawing.traces import FONT, WIDTH, Trace, draw_traces, key
 from campaign.report.page.layout import Layout
 from campaign.report.page.names import FOLDER, trial_file
 from campaign.report.page.templates import Templates
@@ -115,10 +116,10 @@ def charts(account: TrialAccount) -> tuple[Chart, ...]:
     units: dict[str, list[Channel]] = {}
     for channel in recording.channels.values():
         units.setdefault(channel.display_unit or channel.unit, []).append(channel)
-    windows = [Stretch(window.name, window.start, window.stop) for window in account.windows]
     moments = [(event.time, event.text) for event in recording.events]
     return tuple(
-        _chart(recording, unit, channels, windows, moments) for unit, channels in units.items()
+        _chart(recording, unit, channels, account.windows, moments)
+        for unit, channels in units.items()
     )
 
 
@@ -126,7 +127,7 @@ def _chart(
     recording: Recording,
     unit: str,
     channels: Sequence[Channel],
-    windows: Sequence[Stretch],
+    windows: Sequence[Window],
     moments: Sequence[tuple[float, str]],
 ) -> Chart:
     look = looks(channel.name for channel in channels)
