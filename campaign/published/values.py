@@ -20,6 +20,7 @@ from campaign.errors import UsageError
 from campaign.options import Options, spelled
 from campaign.published.patterns import covers
 from campaign.result import Value
+from campaign.text import capitalized
 from campaign.units import convert, to_si
 
 T = TypeVar("T")
@@ -219,7 +220,7 @@ class Cell:
 
 def heading_of(table: str) -> str:
     """Heading of a published table: `Table 5.8`, `Figure 5.14`, `Text 4.2.3`."""
-    return table.capitalize() if " " in table else f"Table {table}"
+    return capitalized(table) if " " in table else f"Table {table}"
 
 
 @dataclass(frozen=True)

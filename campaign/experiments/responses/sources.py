@@ -187,15 +187,15 @@ def _label(group: Sequence[TrialData]) -> str:
 def _all_signals(
     group: Sequence[TrialData], bench: Bench, how: Reading
 ) -> tuple[list[Recorded], list[str]]:
-    recorded, remarks = [], []
+    recorded, refused = [], []
     for trial in group:
         try:
             recorded.append((trial, signals(trial, bench, how.excited)))
         except ValueError as error:
-            remarks.append(f"{trial.trial.label}: {error}.")
+            refused.append((trial.trial.label, error))
     if not recorded:
-        raise ValueError(remarks[0].split(": ", 1)[-1].rstrip("."))
-    return recorded, sorted(set(remarks))
+        raise refused[0][1]
+    return recorded, sorted({f"{label}: {error}." for label, error in refused})
 
 
 def _as_rates(measured: MeasuredResponse, told: Signals, side: Side) -> MeasuredResponse:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from campaign.published.values import heading_of
 from campaign.report.content import lines
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import FAILED, Document
@@ -201,7 +202,7 @@ def _contradictions(document: Document) -> Iterator[Piece]:
         )
         yield Facts(
             tuple(
-                (f"{table if ' ' in table else f'Table {table}'}: {', '.join(cells)}", reason)
+                (f"{heading_of(table)}: {', '.join(cells)}", reason)
                 for table, cells, reason in groups
             )
         )
