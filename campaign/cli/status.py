@@ -11,9 +11,9 @@ from campaign.errors import BackendError, ExitCode
 from campaign.execution.display import clock
 from campaign.link.panic import panic_stop_of
 from campaign.link.port import Port, open_port
-from campaign.link.safe import SafeWatch, query_frame
+from campaign.link.safe import SafeWatch
 from campaign.plain_text import printable
-from campaign.wire.messages import Holder, Latch, Message, Nak, Status
+from campaign.wire.messages import Holder, Latch, Message, Nak, Query, Status, framed
 
 INTERVAL = 0.1
 """Seconds between two queries."""
@@ -69,7 +69,7 @@ def show_status(port: str, baud: int, patience: float, *, as_json: bool) -> Exit
 def _listen(line: Port, answers: Answers, deadline: float) -> None:
     watch = SafeWatch(told=answers.take)
     while not answers.whole and time.monotonic() < deadline:
-        line.write(query_frame())
+        line.write(framed(Query()))
         again = time.monotonic() + INTERVAL
         while not answers.whole and time.monotonic() < again:
             watch.feed(line.read())

@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import BinaryIO, cast
 
 from campaign.errors import UsageError
+from campaign.link.errors import SilenceError
 from campaign.link.pipe import BEAT, WANTED, Kind, receive, send
 
 OPENING = 15.0
@@ -21,10 +22,6 @@ LEAVING = 5.0
 
 BEATS = 400
 """Number of stored heartbeats: 10 s."""
-
-
-class LineLostError(Exception):
-    """The line to the controller is lost; users see an Ending, never this error."""
 
 
 class Connection:
@@ -79,11 +76,11 @@ class Connection:
         return self._relay.pid
 
     def write(self, data: bytes) -> None:
-        """Send bytes to the port. Raises LineLostError."""
+        """Send bytes to the port. Raises SilenceError."""
         self._send(Kind.WRITE, data)
 
     def wanted(self, trial: int, record: int, *, at_once: bool = False) -> None:
-        """Set the next wanted record in all further heartbeats. Raises LineLostError."""
+        """Set the next wanted record in all further heartbeats. Raises SilenceError."""
         self._send(Kind.WANTED, WANTED.pack(trial, record, at_once))
 
     def holds(self, *, held: bool) -> None:
@@ -91,9 +88,8 @@ class Connection:
         self._send(Kind.HOLDS, bytes((held,)))
 
     def receive(self, timeout: float) -> bytes:
-        """Bytes from the port; empty after `timeout` (s). Raises LineLostError."""
-        if self._lost:
-            raise LineLostError(self._lost)
+        """Bytes from the port; empty after `timeout` (s). Raises SilenceError."""
+        self._check_lost()
         deadline = time.monotonic() + timeout
         while True:
             try:
@@ -108,12 +104,12 @@ class Connection:
                 self.beats.pop((counter - BEATS) % 2**32, None)
             if kind is Kind.LOST:
                 self._lost = payload.decode(errors="replace") or "the line is lost"
-                raise LineLostError(self._lost)
+                self._check_lost()
 
     def close(self, *, last_words: bool = True) -> None:
         """End the relay; with `last_words` it sends SAFE to a controller held by this host."""
         if not last_words:
-            with contextlib.suppress(LineLostError):
+            with contextlib.suppress(SilenceError):
                 self.holds(held=False)
         with contextlib.suppress(OSError):
             self._out.close()
@@ -127,14 +123,17 @@ class Connection:
             self._in.close()
 
     def _send(self, kind: Kind, payload: bytes) -> None:
-        if self._lost:
-            raise LineLostError(self._lost)
+        self._check_lost()
         try:
             with self._sending:
                 send(self._out, kind, payload)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError):
             self._lost = "the process that keeps the port has ended"
-            raise LineLostError(self._lost) from error
+        self._check_lost()
+
+    def _check_lost(self) -> None:
+        if self._lost:
+            raise SilenceError(f"the connection was lost: {self._lost}")
 
     def _read(self) -> None:
         with contextlib.suppress(OSError, ValueError):

@@ -66,14 +66,14 @@ def _open_drive(name: str) -> Port:
     """Connect to the process that owns the bus; if there is none or it hangs, use the bus."""
     from campaign.canopen_drive.address import address_of
     from campaign.canopen_drive.line import DirectLine
-    from campaign.link.safe import query_frame
+    from campaign.wire.messages import Query, framed
 
     address = address_of(name)
     port = address.served_at()
     if port is not None:
         with contextlib.suppress(UsageError, OSError):
             line = _open_socket(f"socket://127.0.0.1:{port}")
-            line.write(query_frame())
+            line.write(framed(Query()))
             deadline = time.monotonic() + ANSWER
             while time.monotonic() < deadline:
                 if line.read():
