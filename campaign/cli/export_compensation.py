@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from campaign import __version__
 from campaign.cli.check import CheckedLoop, loops_checked
-from campaign.cli.output import print_line, print_note
+from campaign.cli.output import print_line, print_warning
 from campaign.controller_code.compensation import SampledCompensation, trial_inputs
 from campaign.controller_code.targets import targets
 from campaign.errors import UsageError, writing
@@ -41,9 +41,7 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
         print_line(line)
     low = [each.verdict for each in _loops(compensation.bench, name) if each.verdict != "fine"]
     if low:
-        print_note(
-            f"{len(low)} of its loops are not fine: {'; '.join(dict.fromkeys(low))}", "yellow"
-        )
+        print_warning(f"{len(low)} of its loops are not fine: {'; '.join(dict.fromkeys(low))}")
     return [output / file for file in texts]
 
 
