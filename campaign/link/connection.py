@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from types import TracebackType
 from typing import BinaryIO, cast
 
 from campaign.errors import UsageError
@@ -58,22 +57,6 @@ class Connection:
         if kind is not Kind.OPENED:
             self.close()
             raise UsageError(payload.decode(errors="replace") or f"port {port!r} cannot be opened")
-
-    def __enter__(self) -> Connection:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    @property
-    def relay(self) -> int:
-        """Process id of the relay."""
-        return self._relay.pid
 
     def write(self, data: bytes) -> None:
         """Send bytes to the port. Raises SilenceError."""
