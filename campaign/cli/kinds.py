@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from campaign.backends import backends
 from campaign.channels import UNITS, VOCABULARY, AxisKind
-from campaign.cli.output import console, print_line, print_table, print_warning
+from campaign.cli.output import on_a_terminal, print_line, print_table, print_warning
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
@@ -112,7 +112,7 @@ def _show(
         infos = list(_each_once(tuple(describe(options))))
         if within:
             infos = [i for i in infos if i.name == within or i.name.startswith(f"{within}.")]
-        elif len(infos) > MOST and console().is_terminal:
+        elif len(infos) > MOST and on_a_terminal():
             print_line(
                 f"{len(infos)} options; `campaign kinds {name}.TABLE` shows the options of a table."
             )

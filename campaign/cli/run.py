@@ -107,6 +107,7 @@ def run_header(
     """Header of the archive: all data on the run from before its first trial."""
     plan, asked = prepared.plan, prepared.plan.protocol
     policy = asked.policy.model_dump(mode="json")
+    changes = (change.partition("=") for change in request.changes)
     return RunHeader(
         name=name,
         created=began.isoformat(timespec="milliseconds"),
@@ -133,7 +134,7 @@ def run_header(
         backend=prepared.kind.name,
         source=prepared.kind.source.value,
         backend_options=prepared.options.model_dump(mode="json"),
-        overrides={path: value for path, _, value in map(_parted, request.changes)},
+        overrides={path: value for path, _, value in changes},
         only=plan.only,
         git_revision=provenance.git_revision(prepared.path),
         fingerprint=plan.fingerprint,
@@ -142,7 +143,3 @@ def run_header(
 
 def _absolute(truth: str) -> str:
     return str(Path(truth).resolve()) if names_file(truth) else truth
-
-
-def _parted(change: str) -> tuple[str, str, str]:
-    return change.partition("=")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import queue
-import subprocess
-import sys
 import threading
 import time
 from typing import BinaryIO, cast
@@ -13,6 +11,7 @@ from typing import BinaryIO, cast
 from campaign.errors import UsageError
 from campaign.link.errors import SilenceError
 from campaign.link.pipe import BEAT, WANTED, Kind, receive, send
+from campaign.processes import end_relay, start_relay
 
 OPENING = 15.0
 """Time limit (s) for the relay to open the port, including the start of its process."""
@@ -38,14 +37,7 @@ class Connection:
         self.beats: dict[int, float] = {}
         self._lost = ""
         self._sending = threading.Lock()
-        # New process session: Ctrl-C in a terminal reaches only the host, which stops in order.
-        # -P: no file in the user's folder can replace a module of this program.
-        self._relay = subprocess.Popen(  # noqa: S603 - our own program, no shell
-            [sys.executable, "-P", "-m", "campaign.link.relay", port, str(baud), str(session)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,
-        )
+        self._relay = start_relay("campaign.link.relay", port, str(baud), str(session))
         self._out = cast(BinaryIO, self._relay.stdin)
         self._in = cast(BinaryIO, self._relay.stdout)
         self._reader = threading.Thread(target=self._read, name="line", daemon=True)
@@ -96,11 +88,7 @@ class Connection:
                 self.holds(held=False)
         with contextlib.suppress(OSError):
             self._out.close()
-        try:
-            self._relay.wait(LEAVING)
-        except subprocess.TimeoutExpired:
-            self._relay.kill()
-            self._relay.wait()
+        end_relay(self._relay, LEAVING)
         self._reader.join(LEAVING)  # it drains the pipe until the relay exits
         with contextlib.suppress(OSError):
             self._in.close()
