@@ -142,8 +142,6 @@ class Session:
         try:
             answer = self._greet(patience)
         except RefusedError as error:
-            if error.nak is not None and error.nak.code is NakCode.BUSY:
-                raise HeldError(f"the controller is in use: {printable(error.nak.text)}") from None
             raise BackendError(f"the controller will not talk: {error}") from None
         except SilenceError:
             if self._decoder.counts.wrong_version:
@@ -171,9 +169,8 @@ class Session:
         while True:
             try:
                 return self.command(Hello(VERSION, VERSION, self._number, self._host), patience)
-            except RefusedError as error:
-                busy = error.nak is not None and error.nak.code is NakCode.BUSY
-                if not busy or time.monotonic() > letting_go:
+            except HeldError:
+                if time.monotonic() > letting_go:
                     raise
                 self.look(POLL)
 
@@ -232,8 +229,7 @@ class Session:
                     self.command(Clear())
             except RefusedError as error:
                 passing = (NakCode.WRONG_STATE, NakCode.NOT_READY, NakCode.WRONG_TRIAL)
-                hopeless = error.nak is None or error.nak.code not in passing
-                if hopeless or time.monotonic() > deadline:
+                if error.code not in passing or time.monotonic() > deadline:
                     raise
             if time.monotonic() > deadline:
                 raise RefusedError(f"the controller does not leave the state {state.text}")
@@ -382,9 +378,9 @@ class Session:
             why = printable(answer.text) or answer.code.text
             if answer.code is NakCode.LATCHED:
                 raise StoppedError(self._stop_behind(why))
-            if answer.code is NakCode.BUSY and kind is not Kind.HELLO:
+            if answer.code is NakCode.BUSY:
                 raise HeldError(f"the controller is in use: {why}")
-            raise RefusedError(f"the controller refused {kind.name}: {name}{why}", answer)
+            raise RefusedError(f"the controller refused {kind.name}: {name}{why}", answer.code)
         if answer is None or isinstance(answer, Capabilities) != (kind is Kind.HELLO):
             return None
         if kind is Kind.ARM:
