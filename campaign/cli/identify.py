@@ -30,6 +30,7 @@ from campaign.interrupts import unwinding
 from campaign.report.formats import chosen_formats
 from campaign.report.output import refuse_other
 from campaign.resources import templates_folder
+from campaign.text import count
 
 
 @unwinding()
@@ -170,7 +171,7 @@ def _verdict(found: Identification) -> str:
     counts = {name: len(own) - open_ones[name] for name, own in parameters.items()}
     by = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
     total = sum(counts.values())
-    identified = f"{total} parameter{'' if total == 1 else 's'} identified"
+    identified = f"{count(total, 'parameter')} identified"
     return f"{identified}{f' ({by})' if by else ''}, {sum(open_ones.values())} not determined"
 
 

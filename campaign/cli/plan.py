@@ -40,6 +40,7 @@ from campaign.protocol import (
 )
 from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.stages import most_of
+from campaign.text import count
 from campaign.trial import Most, Role, Trial
 from campaign.units import Quantity, convert
 
@@ -96,7 +97,7 @@ def _print(
         print_line(plan.protocol.title)
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
-        f"{_trials(len(plan.trials))}, {clock(plan.duration)} of bench time; backend "
+        f"{count(len(plan.trials), 'trial')}, {clock(plan.duration)} of bench time; backend "
         f"{prepared.kind.name}; output {archive}, at most {bytes_text(plan.size)}"
     )
     if (most := plan.following).trials:
@@ -123,11 +124,7 @@ def _print(
 
 def in_short(most: Most) -> str:
     """Text such as `at most 14 trials, 0:42 of bench time`."""
-    return f"at most {_trials(most.trials)}, {clock(most.duration)} of bench time"
-
-
-def _trials(count: int) -> str:
-    return "1 trial" if count == 1 else f"{count} trials"
+    return f"at most {count(most.trials, 'trial')}, {clock(most.duration)} of bench time"
 
 
 def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:
@@ -250,8 +247,8 @@ def _print_details(
     for line in () if cost is None else cost_lines(cost):
         print_line(f"  {line}")
     notes = Counter(trial.note for trial in trials if trial.note)
-    for note, count in notes.most_common(NOTES):
-        print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")
+    for note, noted in notes.most_common(NOTES):
+        print_line(f"  {count(noted, 'trial')}: {note}")
     if len(notes) > NOTES:
         print_line(f"  and {len(notes) - NOTES} more notes; --json lists all")
     print_line()

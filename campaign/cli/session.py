@@ -55,6 +55,7 @@ from campaign.policy import Policy
 from campaign.protocol import PlannedStage
 from campaign.recording import Outcome
 from campaign.stopwatch import UNTIMED, Timing, Work
+from campaign.text import count
 from campaign.trial import Trial
 
 
@@ -242,8 +243,9 @@ def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
     """Print the outcome of the run, and how to continue."""
     done = outcome.outcomes.get(Outcome.COMPLETED, 0)
     failed = {o.value: n for o, n in outcome.outcomes.items() if o is not Outcome.COMPLETED}
-    trials = "trial" if done == 1 else "trials"
-    counts = ", ".join([f"{done} {trials} done", *(f"{n} {word}" for word, n in failed.items())])
+    counts = ", ".join(
+        [f"{count(done, 'trial')} done", *(f"{n} {word}" for word, n in failed.items())]
+    )
     reason = f" ({outcome.reason})" if outcome.reason else ""
     go_on = ""
     if outcome.status in (RunStatus.INTERRUPTED, RunStatus.FAULT):
