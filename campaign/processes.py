@@ -1,4 +1,4 @@
-"""Worker processes: start, and end with the parent."""
+"""Worker and relay processes: start and end."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -49,6 +50,29 @@ def start_preloading(preload: Iterable[str]) -> None:
         if before is not None:
             os.environ["PYTHONWARNINGS"] = before
     forkserver.ensure_running()
+
+
+def start_relay(module: str, *arguments: str) -> subprocess.Popen[bytes]:
+    """Process that runs a module of this program, with pipes for its input and output.
+
+    In its own session: Ctrl-C in a terminal reaches only the host, which then stops in order. With
+    -P a file in the user's folder cannot replace a module of this program.
+    """
+    return subprocess.Popen(  # noqa: S603 - this program, no shell
+        [sys.executable, "-P", "-m", module, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
+
+
+def end_relay(process: subprocess.Popen[bytes], patience: float) -> None:
+    """Wait for the end of a process (s), then kill it."""
+    try:
+        process.wait(patience)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def new_pool(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -284,6 +284,15 @@ NONE_MORE = Most(0, 0.0, 0)
 def canonical_json(tree: Any) -> str:
     """JSON text that is identical for equal content: sorted keys, no spaces, no NaN."""
     return json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of all entries that are no tables."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
 
 
 _MOST_TEXTS = 64

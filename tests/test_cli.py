@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, cast
 
 import pytest
 
@@ -17,10 +16,11 @@ from campaign.cli.kinds import show_kind
 from campaign.cli.output import PlainConsole, bytes_text, print_line, print_table
 from campaign.cli.prepare import find_protocol
 from campaign.cli.schemas import init_folder
-from campaign.cli.status import Answers
+from campaign.cli.status import show_status
 from campaign.errors import (
     ArchiveError,
     BackendError,
+    ExitCode,
     LimitError,
     Problem,
     ProtocolError,
@@ -28,6 +28,8 @@ from campaign.errors import (
 )
 from campaign.execution.run_reference import typed
 from campaign.resources import protocols_folder
+from campaign.wire.codes import Fault, LatchCause, State
+from campaign.wire.messages import Holder, Latch, Message, Status, framed
 
 HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "scipy", "tree_sitter")
 COMMANDS = (
@@ -306,9 +308,36 @@ def test_a_thread_that_never_comes_back_does_not_keep_a_failed_command_from_endi
     assert (ended.returncode, ended.stdout) == (3, "said\n"), ended.stderr
 
 
-@pytest.mark.parametrize("missing", ["status", "latch", "holder"])
-def test_a_status_is_whole_once_each_answer_has_come(missing: str) -> None:
-    answers = Answers(*[cast(Any, object())] * 3)
-    assert answers.whole
-    setattr(answers, missing, None)
-    assert not answers.whole
+class Answering:
+    """A port that has these messages to read, again and again."""
+
+    def __init__(self, *messages: Message) -> None:
+        self.data = b"".join(map(framed, messages))
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+    def read(self) -> bytes:
+        return self.data
+
+
+ANSWERS = (
+    Status(State.IDLE, Fault.NONE, True, False, 1, 0.0, 0, 0.0, 0, 0, 0, 0),
+    Latch(latched=False, count=0, cause=LatchCause.NONE, age=None),
+    Holder(held=False, age=None),
+)
+
+
+@pytest.mark.parametrize("missing", [None, *range(3)])
+def test_a_status_is_shown_once_each_answer_has_come(
+    missing: int | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port = Answering(*(each for k, each in enumerate(ANSWERS) if k != missing))
+    monkeypatch.setattr("campaign.cli.status.open_port", lambda *given, **more: port)
+    if missing is None:
+        assert show_status("port", 1, 60.0, as_json=False) is ExitCode.DONE
+        assert "state:  idle, drive off, at rest" in capsys.readouterr().out
+    else:
+        with pytest.raises(BackendError, match="no answer from a controller"):
+            show_status("port", 1, 0.01, as_json=False)

@@ -58,7 +58,7 @@ def report(
     run: Path, output: Path | None = None, code: ExitCode = ExitCode.DONE, **options: bool
 ) -> Path:
     """Make a report of it, as the command does; the run."""
-    assert report_run(str(run), run.parent, output, None, open_it=False, **options)[1] == code
+    assert report_run(str(run), run.parent, output, None, **options)[1] == code
     return run
 
 

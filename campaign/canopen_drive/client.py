@@ -5,16 +5,16 @@ from __future__ import annotations
 import contextlib
 import json
 import queue
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from dataclasses import astuple
+from functools import partial
 from typing import Any, BinaryIO, cast
 
 from campaign.canopen_drive.drive import DriveError
 from campaign.canopen_drive.objects import Item
 from campaign.errors import UsageError
+from campaign.processes import end_relay, start_relay
 
 OPENING = 20.0
 """s; time limit of the relay to open the bus; some adapters are slow."""
@@ -30,24 +30,10 @@ Start = Callable[[str], tuple[BinaryIO, BinaryIO, Callable[[float], None]]]
 
 
 def start_process(address: str) -> tuple[BinaryIO, BinaryIO, Callable[[float], None]]:
-    """Start a relay in a separate process."""
-    # New session: Ctrl-C in a terminal reaches only the host, which then stops in order.
-    # -P: a file in the user's folder cannot replace a module of the program.
-    process = subprocess.Popen(  # noqa: S603 - our own program, no shell
-        [sys.executable, "-P", "-m", "campaign.canopen_drive.relay", address],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        start_new_session=True,
-    )
-
-    def wait(patience: float) -> None:
-        try:
-            process.wait(patience)
-        except subprocess.TimeoutExpired:
-            process.kill()  # the drive stops when its heartbeat ends
-            process.wait()
-
-    return cast(BinaryIO, process.stdin), cast(BinaryIO, process.stdout), wait
+    """Start a relay in a separate process. If it is killed, the drive stops without heartbeat."""
+    process = start_relay("campaign.canopen_drive.relay", address)
+    ends = cast(BinaryIO, process.stdin), cast(BinaryIO, process.stdout)
+    return *ends, partial(end_relay, process)
 
 
 class Client:

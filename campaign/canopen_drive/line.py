@@ -21,8 +21,8 @@ from campaign.canopen_drive.drive import REST_TIME, Drive, DriveError, RestWatch
 from campaign.canopen_drive.state import State as DriveState
 from campaign.plain_text import printable
 from campaign.wire.codes import Fault, Kind, LatchCause, State, WireError
-from campaign.wire.frames import FrameDecoder, encode_frame
-from campaign.wire.messages import Ack, Holder, Message, Query, Safe, Status, decode, encode
+from campaign.wire.frames import FrameDecoder
+from campaign.wire.messages import Ack, Holder, Query, Safe, Status, decode, framed
 from campaign.wire.messages import Latch as LatchMessage
 
 POLL = 0.05
@@ -126,10 +126,10 @@ class Desk:
         for sequence, message in answers.values():
             if isinstance(message, Safe):
                 self._safe(message)
-                reply += _frame(Ack(sequence, Kind.SAFE, State.SAFE, 1))
+                reply += framed(Ack(sequence, Kind.SAFE, State.SAFE, 1))
             elif isinstance(message, Query):
-                reply += _frame(Holder(bool(self.host), 0.0 if self.host else None, self.host))
-        return reply + _frame(self._status()) + _frame(self._latched()) if reply else b""
+                reply += framed(Holder(bool(self.host), 0.0 if self.host else None, self.host))
+        return reply + framed(self._status()) + framed(self._latched()) if reply else b""
 
     def _safe(self, message: Safe) -> None:
         by = printable(message.host) or "an unnamed host"
@@ -163,11 +163,6 @@ class Desk:
             return LatchMessage(latched=False, count=0, cause=LatchCause.NONE, age=None)
         count, by, age = latched
         return LatchMessage(latched=True, count=count, cause=LatchCause.STOPPED, age=age, by=by)
-
-
-def _frame(message: Message) -> bytes:
-    kind, body = encode(message)
-    return encode_frame(kind, 0, body)
 
 
 class DirectLine:

@@ -17,7 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 import campaign
 from campaign.cli import parameters as given
-from campaign.cli.output import paged, print_line, redirect_prints
+from campaign.cli.output import open_page, paged, print_line, redirect_prints
 from campaign.cli.parameters import RESULTS, flag, option, several
 from campaign.errors import ExitCode
 
@@ -53,7 +53,7 @@ class GroupedCommands(TyperGroup):
 class QuietCommand(TyperCommand):
     """A command with a standard output of its own: prints of plug-ins do not reach it.
 
-    The last lines are the returned paths.
+    The last lines are the returned paths; `--open` opens the first one.
     """
 
     def invoke(self, ctx: Any) -> None:
@@ -62,7 +62,10 @@ class QuietCommand(TyperCommand):
             if isinstance(ended, Path):
                 ended = ended, ExitCode.DONE
             written, code = ended if isinstance(ended, tuple) else ((), ended or ExitCode.DONE)
-            for path in [written] if isinstance(written, Path) else written:
+            paths = [written] if isinstance(written, Path) else written
+            if ctx.params.get("open_it"):
+                open_page(paths[0])
+            for path in paths:
                 print_line(str(path))
             ctx.exit(code)
 
@@ -181,9 +184,9 @@ def run(
 
     stopwatch = Stopwatch() if profile else None
     with (stopwatch or UNTIMED).span(Work.IMPORTING):
-        from campaign.cli.cluster import ExecutorChoice
         from campaign.cli.prepare import Request, short_settings
         from campaign.cli.run import Remarks, run_protocol
+        from campaign.cli.run_options import RunOptions
         from campaign.cli.step_check import SETTING
 
     settings = (*(changes or ()), *short_settings(port, source, results, handover))
@@ -191,15 +194,9 @@ def run(
     return run_protocol(
         Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth),
         results,
-        workers=workers,
-        where=ExecutorChoice(executor, tls),
-        report=report,
-        yes=yes,
-        clear_stop=clear_stop,
+        RunOptions(workers, executor, tls, report, yes, clear_stop, sign, watch),
         remarks=Remarks(operator, note, tuple(tags or ())),
-        sign=sign,
         stopwatch=stopwatch,
-        watch=watch,
     )
 
 
@@ -225,21 +222,15 @@ def resume(
     watch: given.Watch = False,
 ) -> Ended:
     """Continue a run that was interrupted, killed or ended by a fault; skip finished trials."""
-    from campaign.cli.cluster import ExecutorChoice
     from campaign.cli.resume import resume_run
+    from campaign.cli.run_options import RunOptions
 
     return resume_run(
         run,
         results,
+        RunOptions(workers, executor, tls, report, yes, clear_stop, sign, watch),
         accept_changes=accept_changes,
-        workers=workers,
-        where=ExecutorChoice(executor, tls),
-        report=report,
         port=port,
-        yes=yes,
-        clear_stop=clear_stop,
-        sign=sign,
-        watch=watch,
     )
 
 
@@ -280,17 +271,16 @@ def import_(
     A mapping is a protocol whose tests were executed by another program: docs/import.md.
     """
     from campaign.cli.import_command import guess_mapping, import_recordings
+    from campaign.cli.run_options import RunOptions
 
     if guess:
         return guess_mapping([Path(each) for each in files])
     return import_recordings(
         files,
         results,
+        RunOptions(workers, report=report, sign=sign),
         only=tuple(only or ()),
         changes=tuple(changes or ()),
-        workers=workers,
-        report=report,
-        sign=sign,
     )
 
 

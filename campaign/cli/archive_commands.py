@@ -79,7 +79,6 @@ def report(
             results,
             output,
             templates,
-            open_it=open_it,
             measure_anew=measure_anew,
             formats=formats or (),
             trials=trials,
@@ -135,9 +134,7 @@ def compare(
     """List the numbers of runs that differ from those of the first, with significance."""
     from campaign.cli.compare import compare_archives
 
-    return compare_archives(
-        runs, results, output, exchanged or (), templates, formats or (), open_it=open_it
-    )
+    return compare_archives(runs, results, output, exchanged or (), templates, formats or ())
 
 
 @command()
@@ -201,7 +198,6 @@ def identify(
         settings=changes or (),
         templates=templates,
         formats=formats or (),
-        open_it=open_it,
     )
 
 
@@ -260,7 +256,6 @@ def trend(
         exchanged or (),
         templates,
         formats or (),
-        open_it=open_it,
     )
 
 
@@ -271,14 +266,10 @@ def index(
     open_it: given.Open = False,
 ) -> Ended:
     """Write index.html into a results folder: one searchable page over all its runs."""
-    from campaign.cli.output import open_page
     from campaign.report.index.page import write_index
     from campaign.resources import templates_folder
 
-    page = write_index(results or folder, templates_folder())
-    if open_it:
-        open_page(page)
-    return page
+    return write_index(results or folder, templates_folder())
 
 
 @command()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from campaign.archive import RunStatus, RunSummary, list_runs
 from campaign.archive.writing.remnants import find_remnants
-from campaign.cli.output import bytes_text, print_json, print_note, print_table
+from campaign.cli.output import bytes_text, print_json, print_note, print_table, print_warning
 from campaign.errors import UsageError
 from campaign.execution.display import clock
 
@@ -101,10 +101,10 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
     else:
         print_table(_HEADINGS, [_row(run) for run in shown], spare=_SPARE)
     for path, what in find_remnants(results).items():
-        print_note(f"{path}: is {what}; it can be removed", style="yellow")
+        print_warning(f"{path}: is {what}; it can be removed")
     for run in runs:
         if run.problem:
-            print_note(f"{run.name}: {run.problem}", style="yellow")
+            print_warning(f"{run.name}: {run.problem}")
 
 
 def _row(run: RunSummary) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.backends.interface import BackendKind
-from campaign.cli.output import print_note
+from campaign.cli.output import print_note, print_warning
 from campaign.errors import CampaignError, ExitCode, UsageError
 from campaign.execution.display import Shown, clock
 from campaign.execution.operator_prompts import UNATTENDED, Attendance, wait_unless
@@ -57,7 +57,7 @@ def allow_motion(
     names = {trial.test for trial in trials}
     unstable = list(sought_instability([test for test in tests if test.name in names]))
     for line in unstable:
-        print_note(line, "yellow")
+        print_warning(line)
     if unstable and not yes:
         _must_agree("The bench will shake or reach a limit. Type yes to permit this: ")
     for line in motion_summary(kind.name, trials, tests):

@@ -11,7 +11,7 @@ from campaign.calibration.document import bench_text, interruption, known_entrie
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.calibration.problem import make_problem
 from campaign.calibration.targets import shortest
-from campaign.cli.output import print_line, print_note, print_table, waiting
+from campaign.cli.output import print_line, print_note, print_table, print_warning, waiting
 from campaign.cli.prepare import find_protocol
 from campaign.errors import ExitCode, UsageError, writing
 from campaign.estimation.multi_start import Progress, agreeing
@@ -47,7 +47,7 @@ def calibrate_protocol(
     check_benches(protocol, tuple(PURPOSES), "a calibration, which simulates,")
     problem = make_problem(protocol, _published(protocol))
     for warning in problem.warnings:
-        print_note(warning, style="yellow")
+        print_warning(warning)
     result, bench = _files(path, results, output)
     fitted, document = shortest(problem.targets, problem.published), _document(protocol, bench)
     source, space = problem.calibration.bench, problem.space
@@ -121,9 +121,9 @@ def _say(outcome: CalibrationOutcome) -> None:
     problem = outcome.problem
     print_table(("parameter", "value", "95 % interval", "note"), _rows(outcome))
     if outcome.interrupted:
-        print_note(interruption(outcome), "yellow")
+        print_warning(interruption(outcome))
     for problem_text in outcome.fitted.problems[:SHOWN_PROBLEMS]:
-        print_note(f"with these values: {problem_text}", "yellow")
+        print_warning(f"with these values: {problem_text}")
     print_note(
         f"cost {outcome.cost_before:.4g} before, {outcome.cost:.4g} now, on "
         f"{len(problem.targets)} cells; {agreeing(outcome.starts)} of {len(outcome.starts)} "

@@ -37,6 +37,7 @@ HEADINGS = (
     "least damped",
     "verdict",
 )
+FACT_KEYS = ("subject", "value", "against", "unit", "share", "verdict", "advice")
 
 
 @dataclass(frozen=True)
@@ -205,16 +206,5 @@ def _tree(loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> dict[str, Any]:
             }
             for loop in loops
         ],
-        "facts": [
-            {
-                "subject": fact.subject,
-                "value": fact.value,
-                "against": fact.against,
-                "unit": fact.unit,
-                "share": fact.share,
-                "verdict": fact.verdict,
-                "advice": fact.advice,
-            }
-            for fact in facts
-        ],
+        "facts": [{name: getattr(fact, name) for name in FACT_KEYS} for fact in facts],
     }

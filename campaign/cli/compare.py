@@ -8,7 +8,7 @@ from pathlib import Path
 
 from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import open_page, print_line, print_note, print_table
+from campaign.cli.output import print_line, print_table, print_warning
 from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.page import write_comparison
 from campaign.comparison.run_comparison import Against, Comparison, compare_runs
@@ -47,8 +47,6 @@ def compare_archives(
     exchanged: Sequence[str],
     templates: Path | None = None,
     formats: Sequence[str] = (),
-    *,
-    open_it: bool,
 ) -> tuple[Path, ExitCode]:
     """Compare the runs that `names` match with the first; return page and exit code for damage."""
     also = chosen_formats(formats)
@@ -61,9 +59,7 @@ def compare_archives(
         _tell(against, comparison)
     for side in comparison.sides:
         for problem in side.problems:
-            print_note(problem, style="yellow")
-    if open_it:
-        open_page(page)
+            print_warning(problem)
     codes = [say_damaged(side.run.path, side.damaged) for side in comparison.sides]
     return page, worst_exit_code(codes)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from campaign.backends import backends
 from campaign.backends.interface import Backend
 from campaign.backends.sim import SimBackend
-from campaign.cli.output import error_console, print_line, print_note
+from campaign.cli.output import error_console, print_line, print_note, print_warning
 from campaign.errors import ExitCode
 from campaign.interrupts import unwinding
 from campaign.trial import Trial
@@ -38,7 +38,7 @@ def compiling_meanwhile(backend: str) -> Iterator[FirstStart | None]:
     from campaign.physics.compilation import distrusted
 
     if why := distrusted():
-        print_note(why, "yellow")
+        print_warning(why)
     with FirstStart() as first:
         yield first
 
@@ -103,11 +103,10 @@ def warm_up() -> ExitCode:
         print_line(f"nothing to compile: all {kept} parts exist, loaded in {taken:.1f} s")
     where = folder()
     if where is None:
-        print_note(
+        print_warning(
             distrusted()
             or "nothing is kept: the user's cache cannot be written; set NUMBA_CACHE_DIR to "
-            "another folder",
-            "yellow",
+            "another folder"
         )
     else:
         print_line(f"kept in {where}")

@@ -10,7 +10,7 @@ from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import heading, in_words, listed
 from campaign.archive.reading.run_reader import RunReader
 from campaign.backends.interface import Backend, ServesArchive
-from campaign.cli.output import print_note
+from campaign.cli.output import print_warning
 from campaign.errors import ExitCode
 
 SHOWN = 20
@@ -21,9 +21,9 @@ def say_damaged(path: Path, damaged: Sequence[Damage]) -> ExitCode:
     """Print damage of the run at `path` on standard error; return ARCHIVE for any damage."""
     if not damaged:
         return ExitCode.DONE
-    print_note(f"{heading(path, damaged)}:", style="yellow")
+    print_warning(f"{heading(path, damaged)}:")
     for line in listed(damaged, SHOWN):
-        print_note(f"  {line}", style="yellow")
+        print_warning(f"  {line}")
     return ExitCode.ARCHIVE
 
 

@@ -9,11 +9,10 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from types import FrameType
 
 from campaign.cli.output import print_line, print_note
 from campaign.device.controller import HEARTBEAT_TIMEOUT, PATIENCE
-from campaign.device.faults import FaultSpec, parse_faults
+from campaign.device.faults import parse_faults
 from campaign.device.latch import new_memory
 from campaign.device.line import PtyStream, TcpLine
 from campaign.device.machine import DeviceLog, Setup
@@ -45,35 +44,26 @@ def run_device(
         raise UsageError("a controller has one line: --pty or --tcp, not both")
     pace = _speed(speed)
     wanted = parse_faults(faults)
+    if heartbeat_timeout is None:
+        heartbeat_timeout = PATIENCE if math.isinf(pace) else HEARTBEAT_TIMEOUT
     with _latch_file(latch, new=new_latch) as file, closing(_log(log)) as noting:
         setup = Setup(simulable(bench), pace, log=noting, latch_file=file)
-        return _serve(setup, tcp, pty, heartbeat_timeout, wanted, fault_seed)
-
-
-def _serve(
-    setup: Setup,
-    tcp: str | None,
-    pty: bool,
-    heartbeat_timeout: float | None,
-    faults: Sequence[FaultSpec],
-    fault_seed: int,
-) -> ExitCode:
-    if heartbeat_timeout is None:
-        heartbeat_timeout = PATIENCE if math.isinf(setup.speed) else HEARTBEAT_TIMEOUT
-    line = PtyStream() if pty else TcpLine(tcp or ANY_PORT)
-    # Compile first: a controller must not be silent for long.
-    warm_up(setup.bench)
-    server = Server(line, setup, timeout=heartbeat_timeout, faults=faults, fault_seed=fault_seed)
-    try:
-        for name in ("SIGTERM", "SIGHUP"):
-            if hasattr(signal, name):  # Windows has no SIGHUP
-                signal.signal(getattr(signal, name), _interrupt)
-        print_line(line.name)
-        print_note(f"emulating the controller of {setup.bench.name!r}; Ctrl-C ends it")
-        print_note(f"panic stops are stored in {setup.latch_file or 'no file'}")
-        server.serve()
-    except KeyboardInterrupt:
-        pass  # the normal end
+        line = PtyStream() if pty else TcpLine(tcp or ANY_PORT)
+        # Compile first: a controller must not be silent for long.
+        warm_up(setup.bench)
+        server = Server(
+            line, setup, timeout=heartbeat_timeout, faults=wanted, fault_seed=fault_seed
+        )
+        try:
+            for name in ("SIGTERM", "SIGHUP"):
+                if hasattr(signal, name):  # Windows has no SIGHUP
+                    signal.signal(getattr(signal, name), signal.default_int_handler)
+            print_line(line.name)
+            print_note(f"emulating the controller of {setup.bench.name!r}; Ctrl-C ends it")
+            print_note(f"panic stops are stored in {file or 'no file'}")
+            server.serve()
+        except KeyboardInterrupt:
+            pass  # the normal end
     return ExitCode.DONE
 
 
@@ -118,10 +108,6 @@ def _make(file: Path) -> None:
 def _log(file: Path | None) -> DeviceLog:
     with writing(f"--log {file}"):
         return DeviceLog(file)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 def _speed(text: str) -> float:

@@ -7,9 +7,8 @@ import platform
 import shutil
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from packaging.requirements import Requirement
 
@@ -21,8 +20,7 @@ LITTLE = 2_000_000_000
 Verdict = Literal["fine", "absent", "look", "wrong"]
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """One line. `verdict`: `absent` is an optional extra; `wrong` prevents some function."""
 
     what: str
@@ -35,14 +33,10 @@ def examine(results: Path, *, as_json: bool) -> ExitCode:
     """Print all findings; return USAGE if one of them is wrong."""
     findings = [*_program(), *_libraries(), *_plug_ins(), *_cache(), *_disk(results), *_ports()]
     if as_json:
-        rows = [
-            {"what": f.what, "is": f.is_, "verdict": f.verdict, "advice": f.advice}
-            for f in findings
-        ]
-        print_json(rows)
+        keys = ("what", "is", "verdict", "advice")
+        print_json([dict(zip(keys, finding, strict=True)) for finding in findings])
     else:
-        lines = [(f.what, f.is_, f.verdict, f.advice) for f in findings]
-        print_table(("what", "is", "verdict", "what to do"), lines)
+        print_table(("what", "is", "verdict", "what to do"), findings)
     return ExitCode.USAGE if any(f.verdict == "wrong" for f in findings) else ExitCode.DONE
 
 

@@ -6,11 +6,9 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from pydantic import BaseModel
-
 from campaign import __version__
 from campaign.cli.check import CheckedLoop, loops_checked
-from campaign.cli.output import print_line, print_note
+from campaign.cli.output import print_line, print_warning
 from campaign.controller_code.compensation import SampledCompensation, trial_inputs
 from campaign.controller_code.targets import targets
 from campaign.errors import UsageError, writing
@@ -19,6 +17,7 @@ from campaign.physics.complete import CompleteBench
 from campaign.protocol.bench_file import bench_source, simulable
 from campaign.protocol.limit_check import margins_in_words
 from campaign.text import number
+from campaign.trial import leaves
 
 
 def export_compensation(bench: str, name: str, target: str, output: Path) -> list[Path]:
@@ -41,9 +40,7 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
         print_line(line)
     low = [each.verdict for each in _loops(compensation.bench, name) if each.verdict != "fine"]
     if low:
-        print_note(
-            f"{len(low)} of its loops are not fine: {'; '.join(dict.fromkeys(low))}", "yellow"
-        )
+        print_warning(f"{len(low)} of its loops are not fine: {'; '.join(dict.fromkeys(low))}")
     return [output / file for file in texts]
 
 
@@ -56,9 +53,11 @@ def _head(bench: str, made: SampledCompensation) -> Iterator[str]:
     yield f"Sampled every {number(1e3 * float(made.controller.period[0]), 4)} ms; SI units."
     if (run := its.known.identified) is not None:
         yield f"Measured values: from {run.run}, digest {run.digest[:16]}"
-    for path, value in _leaves(its.compensation[made.name]):
-        known = its.known.values.get(f"compensation.{made.name}.{path}")
-        yield f"{path} = {value}" + ("" if known is None else f" ({_uncertainty(known)})")
+    options = its.compensation[made.name].model_dump(mode="json", exclude_defaults=True)
+    for path, value in leaves(options):
+        if value is not None and value not in ([], ()):
+            known = its.known.values.get(f"compensation.{made.name}.{path}")
+            yield f"{path} = {value}" + ("" if known is None else f" ({_uncertainty(known)})")
     for each in _loops(its, made.name):
         margins = each.verdict if each.margins is None else margins_in_words(each.margins)
         yield f"Loop, {each.regime}, {each.mode} command: {margins}"
@@ -76,14 +75,3 @@ def _uncertainty(known: KnownValue) -> str:
 
 def _loops(bench: CompleteBench, name: str) -> list[CheckedLoop]:
     return [each for each in loops_checked(bench) if each.compensation == name]
-
-
-def _leaves(options: BaseModel) -> Iterator[tuple[str, object]]:
-    def walk(tree: object, path: str) -> Iterator[tuple[str, object]]:
-        if isinstance(tree, dict):
-            for key, value in tree.items():
-                yield from walk(value, f"{path}.{key}" if path else str(key))
-        elif tree is not None and tree not in ([], ()):
-            yield path, tree
-
-    yield from walk(options.model_dump(mode="json", exclude_defaults=True), "")

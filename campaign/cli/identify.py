@@ -11,7 +11,13 @@ from campaign.archive import find_run
 from campaign.archive.layout.files import why, write_atomically
 from campaign.axis_kind import axis_terms
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import open_page, print_line, print_note, print_table, waiting
+from campaign.cli.output import (
+    print_line,
+    print_note,
+    print_table,
+    print_warning,
+    waiting,
+)
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code, writing
 from campaign.estimate import Origin
 from campaign.identify import experiments_by_model
@@ -24,6 +30,7 @@ from campaign.interrupts import unwinding
 from campaign.report.formats import chosen_formats
 from campaign.report.output import refuse_other
 from campaign.resources import templates_folder
+from campaign.text import count
 
 
 @unwinding()
@@ -39,7 +46,6 @@ def identify_run(
     settings: Sequence[str] = (),
     templates: Path | None = None,
     formats: Sequence[str] = (),
-    open_it: bool = False,
 ) -> tuple[Path, ExitCode]:
     """Identify; write the page and, on request, the bench file; return the page's path.
 
@@ -92,8 +98,6 @@ def identify_run(
         print_note(f"bench: {bench}")
         for method, keys in keys_by_method(identification).items():
             print_note(f"  {method}: {', '.join(keys)}")
-    if open_it:
-        open_page(article)
     return article, worst_exit_code([*map(_say_damaged, sides)])
 
 
@@ -147,7 +151,7 @@ def _say(found: Identification) -> None:
                 continue
             _tell(section)
             if section.problem:
-                print_note(f"not compared: {section.problem}", style="yellow")
+                print_warning(f"not compared: {section.problem}")
             if section.changes and found.compared is not None:
                 changes = changes_table(found.chosen.name, found.compared.name, section)
                 heads = ("parameter", "before", "after", "change", "verdict")
@@ -167,14 +171,14 @@ def _verdict(found: Identification) -> str:
     counts = {name: len(own) - open_ones[name] for name, own in parameters.items()}
     by = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
     total = sum(counts.values())
-    identified = f"{total} parameter{'' if total == 1 else 's'} identified"
+    identified = f"{count(total, 'parameter')} identified"
     return f"{identified}{f' ({by})' if by else ''}, {sum(open_ones.values())} not determined"
 
 
 def _tell(section: Section) -> None:
     print_line(f"{section.model.name} ({section.model.summary})")
     for warning in section.identified.warnings:
-        print_note(f"{section.model.name}: {warning.text}", style="yellow")
+        print_warning(f"{section.model.name}: {warning.text}")
     table = parameters_table([section])
     shown = [[str(row[k]) for k in ("parameter", "value", "unit", "bench")] for row in table.rows]
     print_table(("parameter", "value, 95 %", "unit", "key of the bench"), shown)

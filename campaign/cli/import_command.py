@@ -9,18 +9,17 @@ from pathlib import Path
 from campaign.cli.output import print_text
 from campaign.cli.prepare import IMPORT, Request
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import DEFAULTS, RunOptions
 from campaign.errors import ExitCode, UsageError
 
 
 def import_recordings(
     files: Sequence[str],
     results: Path,
+    given: RunOptions = DEFAULTS,
     *,
     only: tuple[str, ...] = (),
     changes: tuple[str, ...] = (),
-    workers: int | None = 1,
-    report: bool = False,
-    sign: Path | None = None,
 ) -> ExitCode:
     """Archive the recordings of a mapping. Raises UsageError, and the errors of a run."""
     if len(files) != 1:
@@ -34,7 +33,7 @@ def import_recordings(
             f"{shlex.quote(files[0])} > mapping.toml` writes a first one"
         )
     request = Request(files[0], only, changes, IMPORT)
-    return run_protocol(request, results, workers=workers, report=report, sign=sign)
+    return run_protocol(request, results, given)
 
 
 def guess_mapping(files: Sequence[Path]) -> ExitCode:

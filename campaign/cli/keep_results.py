@@ -7,7 +7,7 @@ from campaign.archive import RunReader
 from campaign.archive.layout.results import results_path
 from campaign.archive.reading.results_file import OtherLayoutError, read_any_results
 from campaign.archive.writing.results_file import PreparedResults, prepare_results
-from campaign.cli.output import print_note
+from campaign.cli.output import print_warning
 from campaign.errors import ArchiveError, UsageError
 from campaign.report.content.document import Document
 
@@ -23,9 +23,8 @@ def written_results(
     Results from before a run was damaged are kept, as they cannot be repeated.
     """
     if document.damaged and _found_when_whole(run):
-        print_note(
-            f"{results_path(run.path)}: not changed: it was made before the run was damaged",
-            style="yellow",
+        print_warning(
+            f"{results_path(run.path)}: not changed: it was made before the run was damaged"
         )
         return None
     results = results_of(
@@ -38,7 +37,7 @@ def written_results(
     try:
         return prepare_results(run.path, results)
     except (ArchiveError, UsageError) as error:
-        print_note(f"no results file: {error}", style="yellow")
+        print_warning(f"no results file: {error}")
         return None
 
 

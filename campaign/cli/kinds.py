@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,7 +10,7 @@ from pydantic import BaseModel
 
 from campaign.backends import backends
 from campaign.channels import UNITS, VOCABULARY, AxisKind
-from campaign.cli.output import console, print_line, print_note, print_table
+from campaign.cli.output import on_a_terminal, print_line, print_table, print_warning
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
@@ -26,6 +25,7 @@ from campaign.physics.specimens import specimens
 from campaign.plugins import Kinds, stray_entries
 from campaign.protocol.stages import FIRST
 from campaign.report.formats import formats
+from campaign.text import nearest
 from campaign.unit_grammar import listed
 from campaign.units import convert
 
@@ -52,7 +52,7 @@ def list_kinds() -> None:
     rows += [(MODEL, name, kind.model.summary) for name, kind in experiments_by_model().items()]
     print_table(("room", "name", "description"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
     for problem in (*problems, *stray_entries()):
-        print_note(problem, style="yellow")
+        print_warning(problem)
 
 
 def show_kind(name: str) -> None:
@@ -73,9 +73,8 @@ def show_kind(name: str) -> None:
     named = [room for room in rooms() if name in room]
     models = {} if named else experiments_by_model()
     if not named and name not in models:
-        close = difflib.get_close_matches(name, kind_names(), n=1)
-        hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
-        raise UsageError(f"there is no kind {name!r}; {hint}")
+        hint = nearest(name, kind_names()) or "; `campaign kinds` lists them"
+        raise UsageError(f"there is no kind {name!r}{hint}")
     for room in named:
         kind = room[name]
         options = getattr(kind, "options", None)  # an export format has none
@@ -113,7 +112,7 @@ def _show(
         infos = list(_each_once(tuple(describe(options))))
         if within:
             infos = [i for i in infos if i.name == within or i.name.startswith(f"{within}.")]
-        elif len(infos) > MOST and console().is_terminal:
+        elif len(infos) > MOST and on_a_terminal():
             print_line(
                 f"{len(infos)} options; `campaign kinds {name}.TABLE` shows the options of a table."
             )

@@ -184,6 +184,11 @@ def print_note(text: str, style: str = "") -> None:
     _print_words(error_console(), Text(_plain(text), style=style))
 
 
+def print_warning(text: str) -> None:
+    """Print a note on a problem that does not end the command."""
+    print_note(text, "yellow")
+
+
 def _print_words(out: Console, text: Text, hang: int = 0) -> None:
     """Print text; on a terminal, wrap lines that are too long."""
     if out.is_terminal:
@@ -237,7 +242,7 @@ def _joined(text: str) -> str:
 def open_page(page: Path) -> None:
     """Open a page in a browser; print a note without a browser."""
     if not webbrowser.open(page.resolve().as_uri()):
-        print_note("no browser available; open the file manually", style="yellow")
+        print_warning("no browser available; open the file manually")
 
 
 def print_json(tree: Any) -> None:

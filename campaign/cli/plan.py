@@ -13,7 +13,14 @@ from campaign.archive import new_run_name
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, sides_in
 from campaign.backends.interface import Backend, ExecutesTogether, KnowsCost
 from campaign.cli.damage import archive_of, say_damaged
-from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
+from campaign.cli.output import (
+    bytes_text,
+    print_json,
+    print_line,
+    print_note,
+    print_table,
+    print_warning,
+)
 from campaign.cli.prepare import PreparedRun, Request, lacking, prepare
 from campaign.errors import ExitCode
 from campaign.execution.display import clock
@@ -33,6 +40,7 @@ from campaign.protocol import (
 )
 from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.stages import most_of
+from campaign.text import count
 from campaign.trial import Most, Role, Trial
 from campaign.units import Quantity, convert
 
@@ -89,7 +97,7 @@ def _print(
         print_line(plan.protocol.title)
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
-        f"{_trials(len(plan.trials))}, {clock(plan.duration)} of bench time; backend "
+        f"{count(len(plan.trials), 'trial')}, {clock(plan.duration)} of bench time; backend "
         f"{prepared.kind.name}; output {archive}, at most {bytes_text(plan.size)}"
     )
     if (most := plan.following).trials:
@@ -116,11 +124,7 @@ def _print(
 
 def in_short(most: Most) -> str:
     """Text such as `at most 14 trials, 0:42 of bench time`."""
-    return f"at most {_trials(most.trials)}, {clock(most.duration)} of bench time"
-
-
-def _trials(count: int) -> str:
-    return "1 trial" if count == 1 else f"{count} trials"
+    return f"at most {count(most.trials, 'trial')}, {clock(most.duration)} of bench time"
 
 
 def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:
@@ -138,13 +142,9 @@ def print_warnings(plan: Plan) -> None:
         for line in test.warnings:
             tests.setdefault(line, []).append(test.name)
     for line, names in tests.items():
-        print_note(f"{', '.join(names)}: {line}", "yellow")
+        print_warning(f"{', '.join(names)}: {line}")
     for line in low_margins(plan):
-        print_note(line, "yellow")
-
-
-def _sought(test: PlannedTest) -> str:
-    return "; the experiment seeks instability" if test.seeks_instability else ""
+        print_warning(line)
 
 
 def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
@@ -232,31 +232,33 @@ def _print_details(
         print_line(f"  {line}")
     for use in _closest(test):
         value, bound = in_display_units(use.margin)
-        broken = "  BROKEN" if use.margin.broken else ""
-        share = f"{use.margin.fraction:4.0%} of the {use.margin.called} limit"
-        print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
+        _print_use(plan, use, f"{value} of {bound}")
     with axis_terms(sides_in(trials[0].bench) if trials else BOTH_ROTARY):
         _print_chosen(test)
     for loss in losses:
         print_line(f"  without {loss['channel']}: no {loss['no']}")
     if test.loops:
-        print_line(f"  loop: {in_words(test.loops[0])}{_sought(test)}")
+        sought = "; the experiment seeks instability" if test.seeks_instability else ""
+        print_line(f"  loop: {in_words(test.loops[0])}{sought}")
     for use in test.coarse:
-        broken = "  BROKEN" if use.margin.broken else ""
-        share = f"{use.margin.fraction:4.0%} of the {use.margin.called} limit"
-        print_line(
-            f"  {share}: {one_count(use.margin)} in {plan.trials[use.trial - 1].name}{broken}"
-        )
+        _print_use(plan, use, one_count(use.margin))
     for line in stage_lines(test.stages):
         print_line(f"  {line}")
     for line in () if cost is None else cost_lines(cost):
         print_line(f"  {line}")
     notes = Counter(trial.note for trial in trials if trial.note)
-    for note, count in notes.most_common(NOTES):
-        print_line(f"  {count} {'trial' if count == 1 else 'trials'}: {note}")
+    for note, noted in notes.most_common(NOTES):
+        print_line(f"  {count(noted, 'trial')}: {note}")
     if len(notes) > NOTES:
         print_line(f"  and {len(notes) - NOTES} more notes; --json lists all")
     print_line()
+
+
+def _print_use(plan: Plan, use: LimitUse, amount: str) -> None:
+    """Print the used share of a limit, the amount and its trial."""
+    broken = "  BROKEN" if use.margin.broken else ""
+    share = f"{use.margin.fraction:4.0%} of the {use.margin.called} limit"
+    print_line(f"  {share}: {amount} in {plan.trials[use.trial - 1].name}{broken}")
 
 
 def chosen_lines(test: PlannedTest) -> Iterator[str]:

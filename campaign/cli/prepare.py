@@ -68,7 +68,7 @@ def prepare(request: Request) -> PreparedRun:
     """Load, validate and expand. Raises ProtocolError or UsageError."""
     path = find_protocol(request.protocol)
     kind = find_backend(request.backend)
-    ours = tuple(text for text in request.changes if _is_backend_setting(text))
+    ours = tuple(text for text in request.changes if text.lstrip().startswith("backend."))
     overrides = tuple(text for text in request.changes if text not in ours)
     options = backend_options(kind, ours)
     protocol = load_protocol(
@@ -309,7 +309,3 @@ def backend_options(kind: BackendKind, changes: tuple[str, ...]) -> Options:
         more = f"`campaign kinds {kind.name}` lists the options"
         raise UsageError("\n".join(f"--set {path}: {message}; {more}" for path, message in wrong))
     return options
-
-
-def _is_backend_setting(text: str) -> bool:
-    return text.lstrip().startswith("backend.")

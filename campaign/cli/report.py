@@ -13,7 +13,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, cast
 
 from campaign.archive import RunReader, find_run, open_run
-from campaign.cli.output import open_page, print_note, print_table
+from campaign.cli.output import print_note, print_table, print_warning
 from campaign.errors import DEBUG, ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.interrupts import unwinding
 from campaign.report.processes import (
@@ -40,7 +40,6 @@ def report_run(
     output: Path | None,
     templates: Path | None,
     *,
-    open_it: bool,
     measure_anew: bool = False,
     formats: Sequence[str] = (),
     trials: str = "",
@@ -88,8 +87,6 @@ def report_run(
         for each in written:
             each.discard()
     code = _say(report, path, kept, measure_anew=measure_anew)
-    if open_it:
-        open_page(report.path)
     return report.path, code
 
 
@@ -102,7 +99,7 @@ def _say(report: Report, path: Path, kept: Sequence[str], *, measure_anew: bool)
     lacking = [test for test in report.layout.document.tests if test.lacks_result]
     codes = [say_damaged(path, report.damaged), *([ExitCode.NO_RESULT] if lacking else [])]
     for problem in (*report.problems, *report.left_out):
-        print_note(problem, style="yellow")
+        print_warning(problem)
     if any(test.problem and test.experiment for test in lacking):
         anew = " --measure-anew" if measure_anew else ""
         command = f"{DEBUG}=1 campaign report {reference(path)}{anew}"
@@ -131,7 +128,7 @@ def _published(results: PreparedResults) -> str:
     try:
         return str(results.publish())
     except ArchiveError as error:
-        print_note(f"no results file: {error}", style="yellow")
+        print_warning(f"no results file: {error}")
         return ""
 
 

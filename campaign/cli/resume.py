@@ -13,13 +13,13 @@ from campaign.archive.layout.journal import utc_now
 from campaign.archive.layout.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion, say_by_hand
-from campaign.cli.cluster import HERE, ExecutorChoice
 from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import print_note
+from campaign.cli.output import print_note, print_warning
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
-from campaign.cli.session import Session, conduct, print_warning, require_watch
+from campaign.cli.run_options import RunOptions
+from campaign.cli.session import Session, conduct
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode, UsageError, worst_exit_code
@@ -64,24 +64,16 @@ class Remade:
 def resume_run(
     name: str,
     results: Path,
+    given: RunOptions,
     *,
-    accept_changes: bool,
-    workers: int | None,
-    report: bool,
-    port: str | None,
-    yes: bool,
-    clear_stop: int | None = None,
-    sign: Path | None = None,
-    where: ExecutorChoice = HERE,
-    watch: bool = False,
+    accept_changes: bool = False,
+    port: str | None = None,
 ) -> ExitCode:
     """Execute the remaining trials of a run; the archive's path is the last line of output.
 
     port: present port of the bench; no change that needs acceptance.
-    sign: key to sign the run with; tested before anything moves.
     """
-    if watch:
-        require_watch(where.executor)
+    given.check_watch()
     path = find_run(results, name)
     run = open_run(path)
     guardian = under_guardian(find_backend(run.header.backend))
@@ -96,15 +88,15 @@ def resume_run(
         finished = not_repeated(run)
         trials = (*remade.trials, *followed(run, remade.trials, finished))
         left = [trial for trial in trials if trial.number not in finished]
-        workers = where.check(remade.kind, left, workers)
-        if sign is not None:
-            rehearse_signing(sign)
+        workers = given.parallel(remade.kind, len(left))
+        if given.sign is not None:
+            rehearse_signing(given.sign)
         backend = open_backend(remade.kind, remade.options, left, remade.truths)
         wait_until_compiled(compiling, backend, left)
     print_note(f"{run.name}: {len(finished)} trials are done, {len(left)} remain")
     if remade.kind.by_hand:
         say_by_hand(remade.options)
-    allow_motion(remade.kind, left, remade.tests, yes=yes)
+    allow_motion(remade.kind, left, remade.tests, yes=given.yes)
 
     def open_archive() -> RunWriter:
         signed = run.sealed and has_signature(run.path)
@@ -122,7 +114,7 @@ def resume_run(
             )
         return writer
 
-    with where.opened(backend, left, workers) as (at_once, executor):
+    with given.opened(backend, left, workers) as (at_once, executor):
         session = Session(
             remade.kind,
             backend,
@@ -130,17 +122,15 @@ def resume_run(
             remade.policy,
             at_once,
             path.with_name(f"{run.name}{PARTIAL}"),
-            yes,
-            clear_stop,
+            given,
             finished,
             checks_step=is_checked(remade.options),
             stages=remade.stages,
             asked=run.stages,
             guardian=guardian,
             executor=executor,
-            watch=watch,
         )
-        code = conduct(session, open_archive, report=report, sign=sign)
+        code = conduct(session, open_archive)
     return worst_exit_code([code, read])
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Template
 
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms, sides_in
-from campaign.cli.output import print_line, print_note
+from campaign.cli.output import print_line, print_warning
 from campaign.cli.plan import chosen_lines, in_short
 from campaign.errors import CampaignError, UsageError, writing
 from campaign.execution.display import clock
@@ -102,7 +102,7 @@ def _with_reasons(path: Path) -> None:
     try:
         plan = make_plan(load_protocol(path, experiments(), shipped=protocols_folder()), seed=0)
     except CampaignError as error:
-        print_note(str(error), style="yellow")
+        print_warning(str(error))
         return
     text = path.read_text(encoding="utf-8")
     for test in plan.tests:
@@ -115,7 +115,7 @@ def _with_reasons(path: Path) -> None:
     later = f"; later stages add {in_short(plan.following)}" if plan.stages else ""
     print_line(f"{path}: {len(plan.trials)} trials, {clock(plan.duration)} of bench time{later}")
     for problem in _refusals(plan):
-        print_note(f"{path}: {problem}", style="yellow")
+        print_warning(f"{path}: {problem}")
 
 
 def _comments(lines: Iterator[str]) -> Iterator[str]:

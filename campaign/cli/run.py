@@ -9,12 +9,12 @@ from pathlib import Path
 from campaign.archive import RunHeader, RunWriter, reserved_name
 from campaign.archive.layout.header import PARTIAL, Truth
 from campaign.cli.ask import allow_motion, say_by_hand
-from campaign.cli.cluster import HERE, ExecutorChoice
 from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import PreparedRun, Request, find_backend, prepare
 from campaign.cli.profile import print_profile
-from campaign.cli.session import Session, conduct, require_watch
+from campaign.cli.run_options import RunOptions
+from campaign.cli.session import Session, conduct
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode
@@ -42,24 +42,16 @@ class Remarks:
 def run_protocol(
     request: Request,
     results: Path,
+    given: RunOptions,
     *,
-    workers: int | None,
-    report: bool,
-    yes: bool = False,
-    clear_stop: int | None = None,
     remarks: Remarks | None = None,
-    sign: Path | None = None,
-    where: ExecutorChoice = HERE,
     stopwatch: Stopwatch | None = None,
-    watch: bool = False,
 ) -> ExitCode:
     """Execute a protocol; the archive's path is the last line of standard output.
 
-    sign: key to sign the run with; tested before anything moves.
     stopwatch: if given, its times are printed at the end.
     """
-    if watch:
-        require_watch(where.executor)
+    given.check_watch()
     guardian = under_guardian(find_backend(request.backend))
     timing = stopwatch or UNTIMED
     with compiling_meanwhile(request.backend) as compiling:
@@ -69,19 +61,19 @@ def run_protocol(
             check_limits(plan)
             check_loops(plan)
             print_warnings(plan)
-            workers = where.check(prepared.kind, plan.trials, workers)
-            if sign is not None:
-                rehearse_signing(sign)
+            workers = given.parallel(prepared.kind, len(plan.trials))
+            if given.sign is not None:
+                rehearse_signing(given.sign)
             backend = prepared.open_backend()
         with timing.span(Work.COMPILING):
             wait_until_compiled(compiling, backend, plan.trials)
         timing.add(Work.COMPILING, compiling.processor if compiling else 0.0)
     if prepared.kind.by_hand:
         say_by_hand(prepared.options)
-    allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)
+    allow_motion(prepared.kind, plan.trials, plan.tests, yes=given.yes)
     began = datetime.now(UTC)
     with (
-        where.opened(backend, plan.trials, workers) as (at_once, executor),
+        given.opened(backend, plan.trials, workers) as (at_once, executor),
         reserved_name(results, prepared.path.stem, began) as lock,
     ):
 
@@ -96,16 +88,14 @@ def run_protocol(
             plan.protocol.policy,
             at_once,
             results / f"{lock.name}{PARTIAL}",
-            yes,
-            clear_stop,
+            given,
             checks_step=is_checked(prepared.options),
             timing=timing,
             stages=plan.stages,
             guardian=guardian,
             executor=executor,
-            watch=watch,
         )
-        code = conduct(session, open_archive, report=report, sign=sign)
+        code = conduct(session, open_archive)
     if stopwatch is not None:
         print_profile(stopwatch, at_once)
     return code
@@ -117,6 +107,7 @@ def run_header(
     """Header of the archive: all data on the run from before its first trial."""
     plan, asked = prepared.plan, prepared.plan.protocol
     policy = asked.policy.model_dump(mode="json")
+    changes = (change.partition("=") for change in request.changes)
     return RunHeader(
         name=name,
         created=began.isoformat(timespec="milliseconds"),
@@ -143,7 +134,7 @@ def run_header(
         backend=prepared.kind.name,
         source=prepared.kind.source.value,
         backend_options=prepared.options.model_dump(mode="json"),
-        overrides={path: value for path, _, value in map(_parted, request.changes)},
+        overrides={path: value for path, _, value in changes},
         only=plan.only,
         git_revision=provenance.git_revision(prepared.path),
         fingerprint=plan.fingerprint,
@@ -152,7 +143,3 @@ def run_header(
 
 def _absolute(truth: str) -> str:
     return str(Path(truth).resolve()) if names_file(truth) else truth
-
-
-def _parted(change: str) -> tuple[str, str, str]:
-    return change.partition("=")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,18 +25,14 @@ from campaign.backends.interface import (
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop
-from campaign.cli.output import error_console, print_line, print_note
+from campaign.cli.output import error_console, print_line, print_note, print_warning
 from campaign.cli.prepare import check_connected
+from campaign.cli.run_options import DEFAULTS, RunOptions, in_processes
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
-from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
+from campaign.errors import BackendError, CampaignError, ExitCode, worst_exit_code
 from campaign.execution.display import Shown, clock, progress_display
-from campaign.execution.executors import (
-    FEWEST_FOR_PROCESSES,
-    PRELOADED,
-    OpenExecutor,
-    process_executor,
-)
+from campaign.execution.executors import OpenExecutor, process_executor
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.run_reference import how_to_go_on, reference, typed
 from campaign.execution.runner import run_plan
@@ -57,10 +52,10 @@ from campaign.execution.watch_display import WatchDisplay
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.policy import Policy
-from campaign.processes import start_preloading
 from campaign.protocol import PlannedStage
 from campaign.recording import Outcome
 from campaign.stopwatch import UNTIMED, Timing, Work
+from campaign.text import count
 from campaign.trial import Trial
 
 
@@ -72,8 +67,7 @@ class Session:
         trials: the whole plan, with the trials of stages from before a resume.
         finished: trials that are not executed again, by number.
         folder: present or future folder of the run in progress.
-        yes: whether prompts are suppressed.
-        clear_stop: count of a panic stop that the operator has seen.
+        workers: count of parallel trials.
         checks_step: whether the effect of half the step is reported afterwards.
         repeats: run of a repeated trial; for a replay, the backend states the run itself.
         timing: timing sink.
@@ -81,8 +75,6 @@ class Session:
         asked: stages that were evaluated before, from the journal.
         guardian: of a program that moves a bench.
         executor: executor of the trials; None: threads or processes of this machine.
-        watch: whether channels of the running trial are drawn; trials are then executed in this
-            process.
     """
 
     kind: BackendKind
@@ -91,8 +83,7 @@ class Session:
     policy: Policy
     workers: int
     folder: Path
-    yes: bool = False
-    clear_stop: int | None = None
+    given: RunOptions = DEFAULTS
     finished: Mapping[int, Outcome] = field(default_factory=dict)
     checks_step: bool = False
     repeats: RunReader | None = None
@@ -101,7 +92,6 @@ class Session:
     asked: tuple[TrialsFollowed, ...] = ()
     guardian: GuardianPipes | None = None
     executor: OpenExecutor | None = None
-    watch: bool = False
 
     @property
     def source(self) -> RunReader | None:
@@ -114,17 +104,11 @@ class Session:
         return (trial for trial in self.trials if trial.number not in self.finished)
 
 
-def conduct(
-    session: Session,
-    open_archive: Callable[[], RunWriter],
-    *,
-    report: bool,
-    sign: Path | None = None,
-) -> ExitCode:
+def conduct(session: Session, open_archive: Callable[[], RunWriter]) -> ExitCode:
     """Execute a session; the archive's path is the last line of standard output.
 
     `open_archive` is called after the bench is connected: without a bench there is no run. The
-    sealed run is signed with the key `sign` after any ending.
+    sealed run is signed after any ending.
     """
     began = time.monotonic()
     outcome, code = execute(session, open_archive)
@@ -134,9 +118,9 @@ def conduct(
     try:
         if session.checks_step:
             say_step_check(outcome.archive)
-        if sign is not None:
-            codes.append(sign_new_run(outcome.archive, sign))
-        if report:
+        if session.given.sign is not None:
+            codes.append(sign_new_run(outcome.archive, session.given.sign))
+        if session.given.report:
             with unwinding(), session.timing.span(Work.REPORT):
                 codes.append(_report(outcome))
     finally:
@@ -176,7 +160,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
                 os.chdir(here)
                 with safe_when_broken_off(backend):
                     check_connected(session.kind, backend, session.left)
-                    cleared = clear_stop(backend, session.clear_stop, stop)
+                    cleared = clear_stop(backend, session.given.clear_stop, stop)
                     writer = open_archive()
                     writer.timing = session.timing
                     if cleared:
@@ -221,11 +205,11 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
     measuring = TrialMeasurement(experiments(), session.timing)
     executor, left = session.executor, sum(1 for _ in session.left)
-    here = executor is None and not session.watch
+    here = executor is None and not session.given.watch
     if here and in_processes(session.kind, session.workers, left):
         executor = partial(process_executor, count=session.workers)
     supervision = Supervision(session.kind.source, session.kind.live, timing=session.timing)
-    showing = watching if session.watch else progress_display
+    showing = watching if session.given.watch else progress_display
     with showing(error_console()) as display:
         if isinstance(display, WatchDisplay):
             supervision = replace(supervision, subscribers=(display.seen,))
@@ -237,7 +221,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             display=display,
             stop=stop,
             policy=session.policy,
-            attendance=attendance_of(session.kind, display, yes=session.yes),
+            attendance=attendance_of(session.kind, display, yes=session.given.yes),
             supervision=supervision,
             measure=measuring,
             finished=session.finished,
@@ -255,36 +239,13 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
         )
 
 
-def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
-    """Count of parallel trials: as requested, else as backend and machine allow.
-
-    For worker processes, starts the import of their modules. Raises UsageError for several workers
-    on a backend that executes one trial at a time.
-    """
-    if not kind.several:
-        if wanted is not None and wanted > 1:
-            raise UsageError(
-                f"the backend {kind.name!r} executes one trial at a time; "
-                f"leave --workers {wanted} out"
-            )
-        return 1
-    workers = min(wanted or os.cpu_count() or 1, max(1, trials))
-    if in_processes(kind, workers, trials):
-        start_preloading(PRELOADED)
-    return workers
-
-
-def in_processes(kind: BackendKind, workers: int, trials: int) -> bool:
-    """Whether the workers are processes: for enough trials to outweigh the start of a process."""
-    return kind.picklable and workers > 1 and trials >= FEWEST_FOR_PROCESSES
-
-
 def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
     """Print the outcome of the run, and how to continue."""
     done = outcome.outcomes.get(Outcome.COMPLETED, 0)
     failed = {o.value: n for o, n in outcome.outcomes.items() if o is not Outcome.COMPLETED}
-    trials = "trial" if done == 1 else "trials"
-    counts = ", ".join([f"{done} {trials} done", *(f"{n} {word}" for word, n in failed.items())])
+    counts = ", ".join(
+        [f"{count(done, 'trial')} done", *(f"{n} {word}" for word, n in failed.items())]
+    )
     reason = f" ({outcome.reason})" if outcome.reason else ""
     go_on = ""
     if outcome.status in (RunStatus.INTERRUPTED, RunStatus.FAULT):
@@ -292,11 +253,6 @@ def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
     print_note(f"{outcome.status.value}{reason}: {counts}, in {clock(elapsed)}{go_on}")
     if outcome.exit_code is ExitCode.NOT_SAFE:
         print_note(NOT_SAFE, "bold red")
-
-
-def print_warning(text: str) -> None:
-    """Print a warning: a problem that does not end the command."""
-    print_note(text, "yellow")
 
 
 def _report(outcome: RunOutcome) -> ExitCode:
@@ -330,17 +286,9 @@ def _build_report(outcome: RunOutcome) -> ExitCode:
         name = reference(archive)
         print_note(f"no report of an interrupted run; to make one:\n{typed('report', name)}")
         return ExitCode.DONE
-    page, code = report_run(str(archive), archive.parent, None, None, open_it=False)
+    page, code = report_run(str(archive), archive.parent, None, None)
     print_note(f"report: {page}")
     return code
-
-
-def require_watch(executor: str) -> None:
-    """Raise UsageError if `--watch` cannot draw."""
-    if importlib.util.find_spec("plotext") is None:
-        raise UsageError("--watch needs plotext: pip install 'campaign[watch]'")
-    if executor:
-        raise UsageError("--watch shows only trials of this process; leave --executor out")
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from campaign.archive.layout.signature_file import (
 )
 from campaign.archive.writing.run_lock import RunLock
 from campaign.cli.ask import has_terminal
-from campaign.cli.output import print_line, print_note
+from campaign.cli.output import print_line, print_note, print_warning
 from campaign.errors import ArchiveError, CampaignError, ExitCode, UsageError
 from campaign.execution.run_reference import reference
 from campaign.interrupts import unwinding
@@ -59,10 +59,9 @@ def rehearse_signing(key: Path) -> None:
     """Sign a test text, to detect an unusable key before the run. Raises UsageError."""
     made = signing.sign_test_text(key, ask=has_terminal())
     if made.asked:
-        print_note(
+        print_warning(
             "the passphrase is needed again when the run is sealed; with an agent "
-            f"(`ssh-add {key}`) there is no prompt",
-            "yellow",
+            f"(`ssh-add {key}`) there is no prompt"
         )
 
 
@@ -84,10 +83,9 @@ def sign_new_run(sealed: Path, key: Path) -> ExitCode:
 
 
 def _say_unsigned(sealed: Path, reason: str) -> None:
-    print_note(
+    print_warning(
         f"NOT SIGNED: {reason}\n"
-        f"the run is kept; `campaign sign {reference(sealed)} --key FILE` signs it",
-        "yellow",
+        f"the run is kept; `campaign sign {reference(sealed)} --key FILE` signs it"
     )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import dataclass, field
+from typing import Any
 
 from campaign.cli.latch import latch_text
 from campaign.cli.output import print_json, print_line
@@ -11,74 +12,51 @@ from campaign.errors import BackendError, ExitCode
 from campaign.execution.display import clock
 from campaign.link.panic import panic_stop_of
 from campaign.link.port import Port, open_port
-from campaign.link.safe import SafeWatch, query_frame
+from campaign.link.safe import SafeWatch
 from campaign.plain_text import printable
-from campaign.wire.messages import Holder, Latch, Message, Nak, Status
+from campaign.wire.messages import Holder, Latch, Nak, Query, Status, framed
 
 INTERVAL = 0.1
 """Seconds between two queries."""
 
 
-@dataclass
-class Answers:
-    """Newest received message of each kind."""
-
-    status: Status | None = None
-    latch: Latch | None = None
-    holder: Holder | None = None
-    refused: bool = field(default=False)
-
-    def take(self, message: Message) -> None:
-        """Store one message of the controller."""
-        match message:
-            case Status():
-                self.status = message
-            case Latch():
-                self.latch = message
-            case Holder():
-                self.holder = message
-            case Nak():
-                self.refused = True
-
-    @property
-    def whole(self) -> bool:
-        """Whether all messages have arrived."""
-        return self.status is not None and self.latch is not None and self.holder is not None
+ANSWERS = (Status, Latch, Holder)
+"""Messages that answer a query."""
 
 
 def show_status(port: str, baud: int, patience: float, *, as_json: bool) -> ExitCode:
     """Query and print, without disturbing the holder. Raises BackendError without an answer."""
-    answers = Answers()
     line = open_port(port, baud, exclusive=False)
     try:
-        _listen(line, answers, time.monotonic() + patience)
+        newest = _newest(line, time.monotonic() + patience)
     except OSError as error:
         raise BackendError(f"{port}: the line was lost: {error.strerror or error}") from None
     finally:
         line.close()
-    if not answers.whole:
-        older = "its firmware is too old for this query" if answers.refused else ""
+    if not newest.keys() >= set(ANSWERS):
+        older = "its firmware is too old for this query" if Nak in newest else ""
         raise BackendError(
             f"{port}: {older or f'no answer from a controller for {patience:g} s'}; check "
             "port and baud rate, and whether the firmware has this program's version"
         )
-    _show(answers, as_json=as_json)
+    _show(newest[Status], newest[Latch], newest[Holder], as_json=as_json)
     return ExitCode.DONE
 
 
-def _listen(line: Port, answers: Answers, deadline: float) -> None:
-    watch = SafeWatch(told=answers.take)
-    while not answers.whole and time.monotonic() < deadline:
-        line.write(query_frame())
-        again = time.monotonic() + INTERVAL
-        while not answers.whole and time.monotonic() < again:
-            watch.feed(line.read())
+def _newest(line: Port, deadline: float) -> dict[type, Any]:
+    """Newest message of each type, until all `ANSWERS` have arrived or the deadline has passed."""
+    newest: dict[type, Any] = {}
+    watch = SafeWatch(told=lambda message: newest.update({type(message): message}))
+    again = -math.inf
+    while (now := time.monotonic()) < deadline and not newest.keys() >= set(ANSWERS):
+        if now >= again:
+            line.write(framed(Query()))
+            again = time.monotonic() + INTERVAL
+        watch.feed(line.read())
+    return newest
 
 
-def _show(answers: Answers, *, as_json: bool) -> None:
-    status, latch, holder = answers.status, answers.latch, answers.holder
-    if status is None or latch is None or holder is None:
-        return
+def _show(status: Status, latch: Latch, holder: Holder, *, as_json: bool) -> None:
     stop, host = panic_stop_of(latch), printable(holder.host)
     if as_json:
         tree = {

@@ -10,7 +10,7 @@ from pydantic import JsonValue
 
 from campaign.archive import open_run
 from campaign.backends.step_check import CHANGE
-from campaign.cli.output import print_note
+from campaign.cli.output import print_note, print_warning
 from campaign.options import Options
 from campaign.recording import Outcome
 
@@ -51,10 +51,9 @@ def say_step_check(archive: Path) -> None:
         return
     named = "; ".join(str(each) for each in beyond[:SHOWN])
     more = f"; and {len(beyond) - SHOWN} more" if len(beyond) > SHOWN else ""
-    print_note(
+    print_warning(
         f"step check: half the step changes {len(beyond)} of {len(changes)} trials by more than "
-        f"{TOLERANCE:g} of a channel's RMS: {named}{more}; steps: --set backend.longest_step=...",
-        "yellow",
+        f"{TOLERANCE:g} of a channel's RMS: {named}{more}; steps: --set backend.longest_step=..."
     )
 
 

@@ -10,7 +10,8 @@ from campaign.cli.output import print_line, print_note
 from campaign.errors import ExitCode, UsageError
 from campaign.link.identity import identity, new_session
 from campaign.link.port import Port, open_port
-from campaign.link.safe import SafeWatch, safe_frame
+from campaign.link.safe import SafeWatch
+from campaign.wire.messages import Safe, framed
 
 INTERVAL = 0.02
 """Seconds between two SAFE messages."""
@@ -36,7 +37,7 @@ class Attempt:
 
     def __post_init__(self) -> None:
         self._sequence = random.SystemRandom().randrange(2**16)
-        self._frame = safe_frame(new_session(), identity("campaign stop"), self._sequence)
+        self._frame = framed(Safe(new_session(), identity("campaign stop")), self._sequence)
         self.watch = SafeWatch(self._sequence)
 
     def insist(self, line: Port) -> None:

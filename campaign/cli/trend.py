@@ -8,7 +8,7 @@ from pathlib import Path
 
 from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import open_page, print_line, print_note, print_table
+from campaign.cli.output import print_line, print_table, print_warning
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.experiments import experiments
 from campaign.identify import experiments_by_model
@@ -39,8 +39,6 @@ def trend_of_archives(
     exchanged: Sequence[str] = (),
     templates: Path | None = None,
     formats: Sequence[str] = (),
-    *,
-    open_it: bool,
 ) -> tuple[Path, ExitCode]:
     """Estimate the trends of the runs that `names` match; return page and exit code for damage.
 
@@ -64,12 +62,10 @@ def trend_of_archives(
     _tell(trends)
     for member in trends.members:
         for problem in member.problems:
-            print_note(problem, style="yellow")
+            print_warning(problem)
     for fitted in trends.fitted:
         for problem in fitted.problems:
-            print_note(problem, style="yellow")
-    if open_it:
-        open_page(page)
+            print_warning(problem)
     codes = [say_damaged(member.run.path, member.damaged) for member in trends.members]
     return page, worst_exit_code(codes)
 

@@ -16,7 +16,7 @@ from campaign.archive.reading.results_file import OtherLayoutError, holds_result
 from campaign.archive.verification.result import Verification
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.verification.verify_run import verify_run
-from campaign.cli.output import error_console, print_json, print_line, print_note
+from campaign.cli.output import error_console, print_json, print_line, print_note, print_warning
 from campaign.cli.sign import WHAT_IT_PROVES
 from campaign.errors import ArchiveError, ExitCode, UsageError
 
@@ -74,7 +74,7 @@ def _print(found: Verification, signature: SignatureCheck) -> None:
         root = f", seal {found.root}" if found.root else ""
         print_line(f"{found.path}: sound ({found.trials} trials, {found.datasets} datasets{root})")
     for damage in found.remarks:
-        print_note(f"{found.path}: note: {damage}", style="yellow")
+        print_warning(f"{found.path}: note: {damage}")
     if signature.valid and not found.sound:
         print_line(f"{signature.text}; but the run differs from the signed one")
     elif signature.valid is not None:

@@ -107,16 +107,19 @@ class Controller:
         """Execute a frame from `client`, and answer."""
         if frame.kind & 0x80:
             return  # an echo of a device's message
-        if frame.kind == Kind.SAFE:
-            self._safe(client, frame)
-        elif frame.kind == Kind.HELLO:
-            self._hello(client, frame)
-        elif frame.kind in (Kind.HEARTBEAT, Kind.RESEND, Kind.QUERY, Kind.BYE):
-            self._unnumbered(client, frame)
-        elif self._session.client not in (None, client):
-            self._refuse(client, frame, ConfigurationRefusal(NakCode.BUSY, "", self._held_by()))
-        else:
-            self._command(client, frame)
+        try:
+            if frame.kind == Kind.SAFE:
+                self._safe(client, frame)
+            elif frame.kind == Kind.HELLO:
+                self._hello(client, frame)
+            elif frame.kind in (Kind.HEARTBEAT, Kind.RESEND, Kind.QUERY, Kind.BYE):
+                self._unnumbered(client, frame)
+            elif self._session.client not in (None, client):
+                raise ConfigurationRefusal(NakCode.BUSY, "", self._held_by())
+            else:
+                self._command(client, frame)
+        except ConfigurationRefusal as why:
+            self._refuse(client, frame, why)
 
     def tick(self) -> None:
         """Execute all due actions."""
@@ -233,17 +236,16 @@ class Controller:
             self._send(None if news else client, self._latch.message())
 
     def _hello(self, client: int, frame: Frame) -> None:
-        message = self._decoded(client, frame)
+        message = _decoded(frame)
         if not isinstance(message, Hello):
-            return
+            raise TypeError("every HELLO is one")
         same = self._session.numbering.same_session(message.session)
         if not message.lowest <= VERSION <= message.highest:
             self._send(client, self._capabilities(frame.sequence, 0))
             return
         state = after_hello(self.state, same, self._is_held())
         if isinstance(state, NakCode):
-            self._refuse(client, frame, ConfigurationRefusal(state, "", self._held_by()))
-            return
+            raise ConfigurationRefusal(state, "", self._held_by())
         self._session.begin(client, message.session, frame.sequence, message.host, self._now())
         self._setup.log("hello", host=message.host)
         self._enter(state)
@@ -281,37 +283,23 @@ class Controller:
         turn = self._session.numbering.turn(frame.kind, frame.sequence, frame.body)
         if turn is Turn.OUT_OF_ORDER:
             text = "neither the next command nor the last one again"
-            self._refuse(client, frame, ConfigurationRefusal(NakCode.OUT_OF_ORDER, "", text))
-            return
+            raise ConfigurationRefusal(NakCode.OUT_OF_ORDER, "", text)
         if turn is Turn.REPEATED:
             for answer in self._session.answers:
                 # A stop may have occurred since.
                 self._send(client, self._latch.message() if isinstance(answer, Latch) else answer)
             return
-        message = self._decoded(client, frame)
-        self._session.answers = (
-            (message,) if isinstance(message, Nak) else self._carried_out(client, frame, message)
-        )
-
-    def _decoded(self, client: int, frame: Frame) -> Message:
-        """The message; refuse a malformed one and return the NAK."""
         try:
-            return decode(frame.kind, frame.body)
-        except WireError as error:
-            known = frame.kind in set(Kind)
-            code = NakCode.MALFORMED if known else NakCode.UNKNOWN_MESSAGE
-            return self._refuse(client, frame, ConfigurationRefusal(code, "", str(error)))
+            self._session.answers = self._carried_out(client, frame, _decoded(frame))
+        except ConfigurationRefusal as why:
+            self._session.answers = (self._refuse(client, frame, why),)
 
     def _carried_out(self, client: int, frame: Frame, message: Message) -> tuple[Message, ...]:
-        """Execute a new command; return the answers."""
+        """Execute a new command; return the answers. Raises ConfigurationRefusal."""
         state = after(self.state, Kind(frame.kind))
         if isinstance(state, NakCode):
-            text = f"not in state {self.state.text}"
-            return (self._refuse(client, frame, ConfigurationRefusal(state, "", text)),)
-        try:
-            further = self._do(message, frame)
-        except ConfigurationRefusal as why:
-            return (self._refuse(client, frame, why),)
+            raise ConfigurationRefusal(state, "", f"not in state {self.state.text}")
+        further = self._do(message, frame)
         # STOP does not change the state; the end of the trial does.
         ack = Ack(frame.sequence, Kind(frame.kind), state, self._boot)
         for answer in (ack, *further):
@@ -435,3 +423,13 @@ class Controller:
         self._configuration = Configuration()
         self._fault = codes.Fault.NONE
         self.state = State.IDLE
+
+
+def _decoded(frame: Frame) -> Message:
+    """The message. Raises ConfigurationRefusal for a malformed one."""
+    try:
+        return decode(frame.kind, frame.body)
+    except WireError as error:
+        known = frame.kind in set(Kind)
+        code = NakCode.MALFORMED if known else NakCode.UNKNOWN_MESSAGE
+        raise ConfigurationRefusal(code, "", str(error)) from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from enum import StrEnum
 from campaign.backends.sim import CHANNELS
 from campaign.channels import COMMAND, GYRO_RATE
 from campaign.errors import UsageError
+from campaign.text import nearest
 
 
 class FaultName(StrEnum):
@@ -104,10 +104,9 @@ def _name(text: str, word: str) -> FaultName:
     try:
         return FaultName(word)
     except ValueError:
-        names = [str(name) for name in FaultName]
-        close = difflib.get_close_matches(word, names, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(names)}"
-        raise UsageError(f"--fault {text}: there is no fault {word!r}; {hint}") from None
+        names = list(map(str, FaultName))
+        hint = nearest(word, names) or f"; there are {', '.join(names)}"
+        raise UsageError(f"--fault {text}: there is no fault {word!r}{hint}") from None
 
 
 def _rate(text: str, name: FaultName, value: str | None) -> float:

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
-import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+
+from pydantic import BaseModel, Field, FiniteFloat, StrictBool
 
 from campaign.archive.layout.files import write_atomically
 from campaign.plain_text import printable
@@ -26,9 +25,8 @@ from campaign.wire.messages import LatchCause
 MOST = 2**32
 
 
-@dataclass(frozen=True)
-class Stop:
-    """Content of the permanent memory.
+class Stop(BaseModel, frozen=True):
+    """Content of the permanent memory, as JSON.
 
     Attributes:
         count: number of stops so far, required to clear the latest one.
@@ -37,11 +35,11 @@ class Stop:
             None if unknown.
     """
 
-    latched: bool = False
-    count: int = 0
-    cause: LatchCause = LatchCause.NONE
-    by: str = ""
-    at: float | None = None
+    latched: StrictBool
+    count: int = Field(strict=True, ge=0, lt=MOST)
+    cause: LatchCause
+    by: str
+    at: FiniteFloat | None
 
 
 class LatchMemory:
@@ -55,7 +53,9 @@ class LatchMemory:
         self._wall_clock = wall_clock
         self._session = 0  # session of the last stop, to recognize its repetition
         self._remembered = True
-        self.stop = _read(file) or Stop(True, boot, LatchCause.NO_MEMORY)
+        self.stop = _read(file) or Stop(
+            latched=True, count=boot, cause=LatchCause.NO_MEMORY, by="", at=None
+        )
 
     @property
     def latched(self) -> bool:
@@ -80,7 +80,8 @@ class LatchMemory:
             self.remember()
             return False
         count = (self.stop.count + 1) % MOST
-        self.stop = Stop(True, count, LatchCause.STOPPED, by, self._wall_clock())
+        at = self._wall_clock()
+        self.stop = Stop(latched=True, count=count, cause=LatchCause.STOPPED, by=by, at=at)
         self._remembered = False
         self.remember()
         return True
@@ -100,13 +101,14 @@ class LatchMemory:
         """
         if not self.latched or count != self.stop.count:
             return False
-        self._keep(replace(self.stop, latched=False, cause=LatchCause.NONE))
+        cleared = {"latched": False, "cause": LatchCause.NONE}
+        self._keep(self.stop.model_copy(update=cleared))
         self._session = 0
         return True
 
     def _keep(self, stop: Stop) -> None:
         if self._file is not None:
-            write_atomically(self._file, json.dumps(asdict(stop)))
+            write_atomically(self._file, stop.model_dump_json())
         self.stop = stop
         self._remembered = True
 
@@ -118,7 +120,8 @@ def new_memory(file: Path) -> None:
     """
     if os.path.lexists(file):
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(file))
-    write_atomically(file, json.dumps(asdict(Stop())))
+    never = Stop(latched=False, count=0, cause=LatchCause.NONE, by="", at=None)
+    write_atomically(file, never.model_dump_json())
 
 
 def _read(file: Path | None) -> Stop | None:
@@ -126,17 +129,7 @@ def _read(file: Path | None) -> Stop | None:
     if file is None:
         return None
     try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
+        stop = Stop.model_validate_json(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
         return None
-    try:
-        tree = json.loads(text)
-        at = None if tree["at"] is None else float(tree["at"])
-        if at is not None and not math.isfinite(at):
-            return None
-        cause, count = LatchCause(tree["cause"]), tree["count"]
-        if not (isinstance(tree["latched"], bool) and type(count) is int and 0 <= count < MOST):
-            return None
-        return Stop(tree["latched"], count, cause, clipped(printable(str(tree["by"]))), at)
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-        return None
+    return stop.model_copy(update={"by": clipped(printable(stop.by))})

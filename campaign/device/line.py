@@ -37,11 +37,9 @@ class TcpStream:
         self._connection = connection
 
     def fileno(self) -> int:
-        """File descriptor for a selector."""
         return self._connection.fileno()
 
     def read(self) -> bytes | None:
-        """Received bytes; None if the client has disconnected."""
         try:
             return self._connection.recv(CHUNK) or None
         except BlockingIOError:
@@ -59,7 +57,6 @@ class TcpStream:
             return len(data)
 
     def close(self) -> None:
-        """Close the connection."""
         self._connection.close()
 
 
@@ -105,7 +102,6 @@ class TcpLine:
         return TcpStream(connection)
 
     def close(self) -> None:
-        """Stop listening."""
         self._listener.close()
 
 
@@ -133,18 +129,15 @@ class PtyStream:
         self.name = os.ttyname(self._theirs)
 
     def fileno(self) -> int:
-        """File descriptor for a selector."""
         return self._ours
 
     def read(self) -> bytes | None:
-        """Received bytes."""
         try:
             return os.read(self._ours, CHUNK)
         except OSError:
             return b""
 
     def write(self, data: bytes) -> int:
-        """Send a part of `data`."""
         try:
             return os.write(self._ours, data)
         except OSError:

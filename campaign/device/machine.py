@@ -90,12 +90,10 @@ class Machine:
 
     @property
     def drive_on(self) -> bool:
-        """Whether the drive is on."""
         return self._motion is not None and self._ending is None
 
     @property
     def at_rest(self) -> bool:
-        """Whether the axis is at rest."""
         return self._motion is None
 
     @property
@@ -209,7 +207,6 @@ class DeviceLog:
             self._out.write(json.dumps({"at": time.time(), "event": event, **facts}) + "\n")
 
     def close(self) -> None:
-        """Close the file."""
         if self._out is not None:
             self._out.close()
             self._out = None

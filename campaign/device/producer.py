@@ -26,13 +26,10 @@ class Producer:
     It is a Recorder for the backend. The thread calls `wake` for new samples and at the end.
     """
 
-    def __init__(
-        self, backend: Backend, trial: Trial, wake: Callable[[], None], ahead: int = AHEAD
-    ) -> None:
+    def __init__(self, backend: Backend, trial: Trial, wake: Callable[[], None]) -> None:
         self._backend = backend
         self._trial = trial
         self._wake = wake
-        self._ahead = ahead
         self._changed = threading.Condition()
         self._blocks: deque[Array] = deque()
         self._events: deque[tuple[int, Event]] = deque()
@@ -52,11 +49,6 @@ class Producer:
         with self._changed:
             self._cancelled = True
             self._changed.notify_all()
-
-    def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the simulation ends or reaches its largest advance; return whether it did."""
-        with self._changed:
-            return self._changed.wait_for(self._is_ahead, timeout)
 
     @property
     def ready(self) -> bool:
@@ -114,9 +106,7 @@ class Producer:
 
     def append(self, time: Array, block: Array) -> None:
         with self._changed:
-            self._changed.wait_for(
-                lambda: self._cancelled or self._made - self._taken < self._ahead
-            )
+            self._changed.wait_for(lambda: self._cancelled or self._made - self._taken < AHEAD)
             if self._cancelled:
                 raise CancelledError
             if block.shape[1]:
@@ -131,9 +121,6 @@ class Producer:
     def event(self, event: Event) -> None:
         with self._changed:
             self._events.append((self._made, event))
-
-    def _is_ahead(self) -> bool:
-        return self._ending is not None or self._made - self._taken >= self._ahead
 
     def _run(self) -> None:
         try:

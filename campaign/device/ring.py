@@ -31,11 +31,6 @@ class Ring:
         """Number of stored records."""
         return len(self._records)
 
-    @property
-    def room(self) -> int:
-        """Number of records that fit before the oldest is replaced."""
-        return self.capacity - len(self._records)
-
     def begin(self, trial: int) -> None:
         """Delete all records; further records belong to `trial`."""
         self._records.clear()
@@ -43,7 +38,7 @@ class Ring:
 
     def add(self, record: Record) -> None:
         """Store `record`, which has the number `next`."""
-        if not self.room:
+        if self.used == self.capacity:
             self._records.popleft()
             self.first += 1
         self._records.append(record)

@@ -15,8 +15,8 @@ from campaign.device.faults import FaultSpec
 from campaign.device.line import PtyStream, Stream, TcpLine
 from campaign.device.machine import Setup
 from campaign.device.noise import BadLine
-from campaign.wire.frames import FrameDecoder, encode_frame
-from campaign.wire.messages import End, Event, Message, Samples, encode
+from campaign.wire.frames import FrameDecoder
+from campaign.wire.messages import End, Event, Message, Samples, framed
 
 BACKLOG = 256 * 1024
 """Largest send buffer (bytes); a frame that exceeds it is lost, as in a real controller."""
@@ -181,9 +181,8 @@ class Server:
         cut = self._cut()
         if cut is not None and cut.unplugged:
             return
-        kind, body = encode(message)
         self._sequence = (self._sequence + 1) % 2**16
-        data = self._noise.sent(encode_frame(kind, self._sequence, body))
+        data = self._noise.sent(framed(message, self._sequence))
         for name, client in self._clients.items():
             if number in (None, name) and len(client.waiting) + len(data) <= BACKLOG:
                 client.waiting += data

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from campaign.importing.defects.clock import SHORTEST, EvenClock, even_clock
-from campaign.importing.defects.defect import counted
 from campaign.importing.derived_channels import (
     PLAIN,
     RigFacts,
@@ -39,6 +38,7 @@ from campaign.importing.open_files import OpenedFiles
 from campaign.importing.reader import RecordingReader
 from campaign.importing.trial_rows import NEEDED, Stretch, by_restart, by_trigger, by_value
 from campaign.protocol.positions import Keys
+from campaign.text import count
 from campaign.unit_grammar import parse_unit
 
 TIMELESS = (
@@ -218,7 +218,7 @@ class _Finding:
     ) -> Sequence[Stretch]:
         total = self.opened.rows(*main)
         if total < SHORTEST:
-            message = f"it has {counted(total, 'row')}, and {NEEDED}"
+            message = f"it has {count(total, 'row')}, and {NEEDED}"
             raise self._wrong(message, ("file",))
         first, stop = self._bounds(clock, total)
         entry = self.entry
@@ -254,7 +254,7 @@ class _Finding:
             begin = "its beginning" if entry.start is None else f"{entry.start:g} s"
             end = "its end" if entry.stop is None else f"{entry.stop:g} s"
             message = (
-                f"{counted(max(stop - first, 0), 'row')} from {begin} to {end}, and {NEEDED}; its "
+                f"{count(max(stop - first, 0), 'row')} from {begin} to {end}, and {NEEDED}; its "
                 f"times are {times[0]:g} to {times[-1]:g} s"
             )
             key = "stop" if entry.start is None else "start"
@@ -281,7 +281,7 @@ class _Finding:
         shifts = [each.shift for each in made if each.clock is None]
         skip, cut = max(0, -min(shifts, default=0)), max(0, *shifts, 0)
         if (left := even.samples - skip - cut) < SHORTEST:
-            what = f"its delays and repairs leave {counted(max(left, 0), 'sample')}, and {NEEDED}"
+            what = f"its delays and repairs leave {count(max(left, 0), 'sample')}, and {NEEDED}"
             raise self._wrong(what, ("file",))
         described = RecordingDescription(
             files=self.used,

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from campaign.importing.defects.clock import SHORTEST, restarts
-from campaign.importing.defects.defect import counted
 from campaign.importing.interface import Array
+from campaign.text import count
 
 NEEDED = f"a recording needs {SHORTEST}"
 
@@ -44,7 +44,7 @@ def by_value(values: Array, first: int, name: str, wanted: float | None = None) 
         if not stretches:
             raise ValueError(f"column {name!r} is never {wanted:g}")
     empty = int(len(values) - known.sum())
-    blank = f"column {name!r} has no value in {counted(empty, 'row')}" if empty else ""
+    blank = f"column {name!r} has no value in {count(empty, 'row')}" if empty else ""
     if not stretches:
         raise ValueError(blank)
     long, remarks = _long(stretches, f"column {name!r}", blank)
@@ -76,12 +76,13 @@ def _long(
     if not long:
         lengths = [b - a for a, b in found]
         raise ValueError(
-            f"{what} makes {counted(len(found), 'stretch')}, the shortest of "
-            f"{counted(min(lengths), 'row')} and the longest of {counted(max(lengths), 'row')}; "
+            f"{what} makes {count(len(found), 'stretch', 'stretches')}, the shortest of "
+            f"{count(min(lengths), 'row')} and the longest of {count(max(lengths), 'row')}; "
             f"{NEEDED}{f'. {blank[0].upper()}{blank[1:]}' if blank else ''}"
         )
     are = "is no trial" if short == 1 else "are no trials"
-    remark = f"{counted(short, 'stretch')} of {what} with fewer than {SHORTEST} rows {are}"
+    stretches = count(short, "stretch", "stretches")
+    remark = f"{stretches} of {what} with fewer than {SHORTEST} rows {are}"
     return long, [remark] if short else []
 
 
@@ -115,11 +116,11 @@ def by_trigger(
         if begin < end:
             raise ValueError(
                 f"column {name!r} rises through {level:g} again in row {begin + 1}, "
-                f"{counted(end - begin, 'row')} before the end of a trial; take a shorter "
+                f"{count(end - begin, 'row')} before the end of a trial; take a shorter "
                 "'duration', or another 'level'"
             )
     if (fewest := min(b - a for a, b in pairs)) < SHORTEST:
-        raise ValueError(f"its 'duration' holds {counted(fewest, 'row')}, and {NEEDED}")
+        raise ValueError(f"its 'duration' holds {count(fewest, 'row')}, and {NEEDED}")
     return _numbered([Stretch(a, b - a, {}) for a, b in pairs])
 
 

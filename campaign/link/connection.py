@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import queue
-import subprocess
-import sys
 import threading
 import time
-from types import TracebackType
 from typing import BinaryIO, cast
 
 from campaign.errors import UsageError
+from campaign.link.errors import SilenceError
 from campaign.link.pipe import BEAT, WANTED, Kind, receive, send
+from campaign.processes import end_relay, start_relay
 
 OPENING = 15.0
 """Time limit (s) for the relay to open the port, including the start of its process."""
@@ -21,10 +20,6 @@ LEAVING = 5.0
 
 BEATS = 400
 """Number of stored heartbeats: 10 s."""
-
-
-class LineLostError(Exception):
-    """The line to the controller is lost; users see an Ending, never this error."""
 
 
 class Connection:
@@ -42,14 +37,7 @@ class Connection:
         self.beats: dict[int, float] = {}
         self._lost = ""
         self._sending = threading.Lock()
-        # New process session: Ctrl-C in a terminal reaches only the host, which stops in order.
-        # -P: no file in the user's folder can replace a module of this program.
-        self._relay = subprocess.Popen(  # noqa: S603 - our own program, no shell
-            [sys.executable, "-P", "-m", "campaign.link.relay", port, str(baud), str(session)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,
-        )
+        self._relay = start_relay("campaign.link.relay", port, str(baud), str(session))
         self._out = cast(BinaryIO, self._relay.stdin)
         self._in = cast(BinaryIO, self._relay.stdout)
         self._reader = threading.Thread(target=self._read, name="line", daemon=True)
@@ -62,28 +50,12 @@ class Connection:
             self.close()
             raise UsageError(payload.decode(errors="replace") or f"port {port!r} cannot be opened")
 
-    def __enter__(self) -> Connection:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    @property
-    def relay(self) -> int:
-        """Process id of the relay."""
-        return self._relay.pid
-
     def write(self, data: bytes) -> None:
-        """Send bytes to the port. Raises LineLostError."""
+        """Send bytes to the port. Raises SilenceError."""
         self._send(Kind.WRITE, data)
 
     def wanted(self, trial: int, record: int, *, at_once: bool = False) -> None:
-        """Set the next wanted record in all further heartbeats. Raises LineLostError."""
+        """Set the next wanted record in all further heartbeats. Raises SilenceError."""
         self._send(Kind.WANTED, WANTED.pack(trial, record, at_once))
 
     def holds(self, *, held: bool) -> None:
@@ -91,9 +63,8 @@ class Connection:
         self._send(Kind.HOLDS, bytes((held,)))
 
     def receive(self, timeout: float) -> bytes:
-        """Bytes from the port; empty after `timeout` (s). Raises LineLostError."""
-        if self._lost:
-            raise LineLostError(self._lost)
+        """Bytes from the port; empty after `timeout` (s). Raises SilenceError."""
+        self._check_lost()
         deadline = time.monotonic() + timeout
         while True:
             try:
@@ -108,33 +79,32 @@ class Connection:
                 self.beats.pop((counter - BEATS) % 2**32, None)
             if kind is Kind.LOST:
                 self._lost = payload.decode(errors="replace") or "the line is lost"
-                raise LineLostError(self._lost)
+                self._check_lost()
 
     def close(self, *, last_words: bool = True) -> None:
         """End the relay; with `last_words` it sends SAFE to a controller held by this host."""
         if not last_words:
-            with contextlib.suppress(LineLostError):
+            with contextlib.suppress(SilenceError):
                 self.holds(held=False)
         with contextlib.suppress(OSError):
             self._out.close()
-        try:
-            self._relay.wait(LEAVING)
-        except subprocess.TimeoutExpired:
-            self._relay.kill()
-            self._relay.wait()
+        end_relay(self._relay, LEAVING)
         self._reader.join(LEAVING)  # it drains the pipe until the relay exits
         with contextlib.suppress(OSError):
             self._in.close()
 
     def _send(self, kind: Kind, payload: bytes) -> None:
-        if self._lost:
-            raise LineLostError(self._lost)
+        self._check_lost()
         try:
             with self._sending:
                 send(self._out, kind, payload)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError):
             self._lost = "the process that keeps the port has ended"
-            raise LineLostError(self._lost) from error
+        self._check_lost()
+
+    def _check_lost(self) -> None:
+        if self._lost:
+            raise SilenceError(f"the connection was lost: {self._lost}")
 
     def _read(self) -> None:
         with contextlib.suppress(OSError, ValueError):

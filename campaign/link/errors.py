@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from campaign.recording import Fault, PanicStop
-from campaign.wire.messages import Nak
+from campaign.wire.codes import NakCode
 
 
 class LinkFaultError(Exception):
@@ -32,14 +32,14 @@ class RefusedError(LinkFaultError):
     """The controller refused a command.
 
     Attributes:
-        nak: its answer; None if the host refuses in its place.
+        code: of its answer; None if the host refuses in its place.
     """
 
     fault = Fault.REFUSED
 
-    def __init__(self, text: str, nak: Nak | None = None) -> None:
+    def __init__(self, text: str, code: NakCode | None = None) -> None:
         super().__init__(text)
-        self.nak = nak
+        self.code = code
 
 
 class StoppedError(LinkFaultError):

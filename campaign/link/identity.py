@@ -8,6 +8,7 @@ import platform
 import random
 
 from campaign.plain_text import printable
+from campaign.wire.fields import clipped
 
 LONGEST = 120
 """Largest size (bytes of UTF-8); a controller may have little memory."""
@@ -25,4 +26,4 @@ def identity(purpose: str) -> str:
     except Exception:  # noqa: BLE001 - an account without a name; a stop must not fail by it
         user = "unknown"
     text = f"{user}@{platform.node() or 'unknown'} pid {os.getpid()}, {purpose}"
-    return printable(text).encode("utf-8", "replace")[:LONGEST].decode("utf-8", "ignore")
+    return clipped(printable(text), LONGEST)

@@ -36,19 +36,9 @@ def send(pipe: BinaryIO, kind: Kind, payload: bytes = b"") -> None:
 
 def receive(pipe: BinaryIO) -> tuple[Kind, bytes] | None:
     """The next item; None if the other end has closed."""
-    head = _exactly(pipe, _HEAD.size)
-    if head is None:
+    head = pipe.read(_HEAD.size)
+    if len(head) < _HEAD.size:
         return None
     kind, length = _HEAD.unpack(head)
-    payload = _exactly(pipe, length)
-    return None if payload is None else (Kind(kind), payload)
-
-
-def _exactly(pipe: BinaryIO, count: int) -> bytes | None:
-    data = b""
-    while len(data) < count:
-        part = pipe.read(count - len(data))
-        if not part:
-            return None
-        data += part
-    return data
+    payload = pipe.read(length)
+    return (Kind(kind), payload) if len(payload) == length else None

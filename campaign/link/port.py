@@ -66,14 +66,14 @@ def _open_drive(name: str) -> Port:
     """Connect to the process that owns the bus; if there is none or it hangs, use the bus."""
     from campaign.canopen_drive.address import address_of
     from campaign.canopen_drive.line import DirectLine
-    from campaign.link.safe import query_frame
+    from campaign.wire.messages import Query, framed
 
     address = address_of(name)
     port = address.served_at()
     if port is not None:
         with contextlib.suppress(UsageError, OSError):
             line = _open_socket(f"socket://127.0.0.1:{port}")
-            line.write(query_frame())
+            line.write(framed(Query()))
             deadline = time.monotonic() + ANSWER
             while time.monotonic() < deadline:
                 if line.read():
@@ -92,7 +92,6 @@ class SocketPort:
         self._connection = connection
 
     def read(self) -> bytes:
-        """Received bytes, after at most POLL."""
         try:
             ready, _, _ = select.select([self._connection], [], [], POLL)
         except ValueError as error:  # closed by another thread
@@ -105,7 +104,6 @@ class SocketPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send all bytes."""
         self._connection.sendall(data)
 
     def close(self) -> None:
@@ -141,7 +139,6 @@ class SerialPort:
         self._empty = 0
 
     def read(self) -> bytes:
-        """Received bytes, after at most POLL."""
         try:
             data = bytes(self._device.read(max(1, self._device.in_waiting)))
         except (TypeError, AttributeError) as error:  # closed by another thread
@@ -158,14 +155,12 @@ class SerialPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send all bytes."""
         try:
             self._device.write(data)
         except (TypeError, AttributeError) as error:
             raise ConnectionError("the port is closed") from error
 
     def close(self) -> None:
-        """Close the line."""
         with contextlib.suppress(OSError):
             self._device.close()
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from typing import Any
 
-from campaign.trial import Tree, Trial
+from campaign.trial import Trial, leaves
 
 COMMANDED = ("controller", "compensation", "limits")
 """The tables of a bench that are sent to its controller; the others describe the plant."""
@@ -60,7 +59,7 @@ class Refusal:
         name = str(trial.bench.get("name", ""))
         plant = {
             path: value
-            for path, value in _leaves(trial.bench, "bench.")
+            for path, value in leaves(trial.bench, "bench.")
             if path.split(".")[1] not in (*COMMANDED, *WORDS)
         }
         before, where = self._plants.get(name, plant), self._trials.get(name, "")
@@ -82,11 +81,3 @@ def _nobody_sets(path: str, what: str) -> str:
         f"{path} {what}, but it belongs to the bench itself and no controller can set it; "
         "name it in `sets` of a [[test.operator]] if a person does, or use the backend sim"
     )
-
-
-def _leaves(tree: Tree | Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value

@@ -19,7 +19,8 @@ from typing import BinaryIO
 from campaign.errors import UsageError
 from campaign.link.pipe import BEAT, WANTED, Kind, receive, send
 from campaign.link.port import Port, open_port
-from campaign.link.safe import SafeWatch, bye_frame, heartbeat_frame, safe_frame
+from campaign.link.safe import SafeWatch
+from campaign.wire.messages import Bye, Heartbeat, Safe, framed
 
 HEARTBEAT_INTERVAL = 0.025
 """s; a controller stops after 100 ms without a heartbeat."""
@@ -84,7 +85,7 @@ class Relay:
         if not self._holds or (self._lapsed and self._is_anothers()):
             return True
         seen = self._seen_safe()
-        self._write(bye_frame(self._session))
+        self._write(framed(Bye(self._session)))
         return seen
 
     def _is_anothers(self) -> bool:
@@ -104,7 +105,7 @@ class Relay:
         self._watch = watch
         end = time.monotonic() + LAST_WORDS
         while not self._lost.is_set() and time.monotonic() < end:
-            self._write(safe_frame(self._session))
+            self._write(framed(Safe(self._session)))
             if watch.confirmed.wait(SAFE_INTERVAL):
                 return True
         return False
@@ -138,7 +139,7 @@ class Relay:
         with self._writing:
             self._counter = (self._counter + 1) % 2**32
             self._beats.append((self._counter, time.monotonic()))
-            self._write(heartbeat_frame(self._counter, *self._wanted, self._session))
+            self._write(framed(Heartbeat(self._counter, *self._wanted, self._session)))
 
     def _write(self, data: bytes) -> None:
         try:

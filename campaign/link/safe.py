@@ -1,4 +1,4 @@
-"""Frames without a session, and the wait for a confirmed safe state.
+"""The wait for a confirmed safe state.
 
 The relay imports this module: it must import quickly.
 """
@@ -9,39 +9,8 @@ import threading
 from collections.abc import Callable
 
 from campaign.wire.codes import Kind, State, WireError
-from campaign.wire.frames import Frame, FrameDecoder, encode_frame
-from campaign.wire.messages import (
-    Ack,
-    Bye,
-    Heartbeat,
-    Latch,
-    Message,
-    Query,
-    Safe,
-    Status,
-    decode,
-    encode,
-)
-
-
-def heartbeat_frame(counter: int, trial: int, wanted: int, session: int) -> bytes:
-    """Heartbeat of the host of `session`, which has all records of `trial` before `wanted`."""
-    return _frame(Heartbeat(counter, trial, wanted, session))
-
-
-def safe_frame(session: int = 0, host: str = "", sequence: int = 0) -> bytes:
-    """SAFE: drive off, now. A controller obeys it from any sender, with any sequence number."""
-    return _frame(Safe(session, host), sequence)
-
-
-def bye_frame(session: int) -> bytes:
-    """BYE: the host of `session` leaves."""
-    return _frame(Bye(session))
-
-
-def query_frame() -> bytes:
-    """QUERY: requests status and latch."""
-    return _frame(Query())
+from campaign.wire.frames import Frame, FrameDecoder
+from campaign.wire.messages import Ack, Latch, Message, Status, decode
 
 
 def is_safe(status: Status) -> bool:
@@ -94,8 +63,3 @@ class SafeWatch:
                 self.confirmed.set()
             else:
                 self.confirmed.clear()
-
-
-def _frame(message: Message, sequence: int = 0) -> bytes:
-    kind, body = encode(message)
-    return encode_frame(kind, sequence, body)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from campaign.errors import BackendError
-from campaign.link.connection import Connection, LineLostError
+from campaign.link.connection import Connection
 from campaign.link.errors import (
     HeldError,
     RefusedError,
@@ -19,7 +19,7 @@ from campaign.link.errors import (
     StoppedError,
 )
 from campaign.link.panic import panic_stop_of
-from campaign.link.safe import is_safe, query_frame, safe_frame
+from campaign.link.safe import is_safe
 from campaign.plain_text import printable
 from campaign.recording import PanicStop
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
@@ -38,7 +38,9 @@ from campaign.wire.messages import (
     LostRecords,
     Message,
     Nak,
+    Query,
     Release,
+    Safe,
     Samples,
     Start,
     Status,
@@ -47,6 +49,7 @@ from campaign.wire.messages import (
     configuration_crc,
     decode,
     encode,
+    framed,
     parameter_messages,
 )
 
@@ -139,8 +142,6 @@ class Session:
         try:
             answer = self._greet(patience)
         except RefusedError as error:
-            if error.nak is not None and error.nak.code is NakCode.BUSY:
-                raise HeldError(f"the controller is in use: {printable(error.nak.text)}") from None
             raise BackendError(f"the controller will not talk: {error}") from None
         except SilenceError:
             if self._decoder.counts.wrong_version:
@@ -159,7 +160,7 @@ class Session:
             )
         self.capabilities = answer
         self._channels.clear()
-        self._hold(held=True)
+        self._connection.holds(held=True)
         return answer
 
     def _greet(self, patience: float | None) -> Ack | Capabilities:
@@ -167,10 +168,9 @@ class Session:
         letting_go = time.monotonic() + (LETTING_GO if patience is None else 0.0)
         while True:
             try:
-                return self._command(Hello(VERSION, VERSION, self._number, self._host), patience)
-            except RefusedError as error:
-                busy = error.nak is not None and error.nak.code is NakCode.BUSY
-                if not busy or time.monotonic() > letting_go:
+                return self.command(Hello(VERSION, VERSION, self._number, self._host), patience)
+            except HeldError:
+                if time.monotonic() > letting_go:
                     raise
                 self.look(POLL)
 
@@ -183,7 +183,7 @@ class Session:
         self.latch = None
         deadline = time.monotonic() + ASKING
         while time.monotonic() < deadline and not self.given_up():
-            self._write(query_frame())
+            self._connection.write(framed(Query()))
             again = time.monotonic() + FIRST_WAIT
             while time.monotonic() < again:
                 self.look(POLL)
@@ -194,7 +194,7 @@ class Session:
 
     def clear_stop(self, count: int) -> None:
         """Unlatch the controller after the stop number `count`. Raises LinkFaultError."""
-        self._command(Unlatch(count, self._host))
+        self.command(Unlatch(count, self._host))
 
     def configure(self, parameters: Mapping[str, Value]) -> tuple[float, tuple[Channel, ...]]:
         """Clear, set and arm; return recording rate (Hz) and channels. Raises LinkFaultError."""
@@ -204,8 +204,8 @@ class Session:
         bodies = []
         for message in parameter_messages(parameters):
             bodies.append(encode(message)[1])
-            self._command(message)
-        self._command(Arm(configuration_crc(bodies)))
+            self.command(message)
+        self.command(Arm(configuration_crc(bodies)))
         first = next(iter(self._channels[self._sequence].values()))
         parts = sorted(self._channels[self._sequence].values(), key=lambda part: part.first)
         return first.sample_rate, tuple(channel for part in parts for channel in part.channels)
@@ -224,13 +224,12 @@ class Session:
                 if state is State.RUNNING:
                     self.safe(deadline)
                 elif state is State.ENDED:
-                    self._command(Release(self._fresh_status().trial))
+                    self.command(Release(self._fresh_status().trial))
                 else:
-                    self._command(Clear())
+                    self.command(Clear())
             except RefusedError as error:
                 passing = (NakCode.WRONG_STATE, NakCode.NOT_READY, NakCode.WRONG_TRIAL)
-                hopeless = error.nak is None or error.nak.code not in passing
-                if hopeless or time.monotonic() > deadline:
+                if error.code not in passing or time.monotonic() > deadline:
                     raise
             if time.monotonic() > deadline:
                 raise RefusedError(f"the controller does not leave the state {state.text}")
@@ -249,21 +248,16 @@ class Session:
 
     def start(self, trial: int) -> None:
         """Start the trial: the axis moves. Raises LinkFaultError."""
-        self._connection_wanted(trial, 0)
-        self._command(Start(trial))
-
-    def command(self, message: Message) -> None:
-        """Send a command until it is answered. Raises LinkFaultError."""
-        self._command(message)
+        self._connection.wanted(trial, 0)
+        self.command(Start(trial))
 
     def send(self, message: Message) -> None:
         """Send once, without waiting for an answer. Raises SilenceError if the line is lost."""
-        kind, body = encode(message)
-        self._write(encode_frame(kind, 0, body))
+        self._connection.write(framed(message))
 
     def wanted(self, trial: int, record: int, *, at_once: bool) -> None:
         """Set the next wanted record in the heartbeats."""
-        self._connection_wanted(trial, record, at_once=at_once)
+        self._connection.wanted(trial, record, at_once=at_once)
 
     def safe(self, deadline: float) -> bool:
         """Send SAFE until the controller reports it; False after `deadline` (steady clock, s).
@@ -277,7 +271,7 @@ class Session:
                 self.hello(GREETING)
         self.status = None  # only new reports are valid
         while time.monotonic() < deadline:
-            self._write(safe_frame(self._number, self._host))
+            self._connection.write(framed(Safe(self._number, self._host)))
             again = time.monotonic() + SAFE_INTERVAL
             while time.monotonic() < again:
                 self.look(max(0.0, again - time.monotonic()))
@@ -303,10 +297,7 @@ class Session:
         Raises SilenceError after `silence` without a message, ResetError if the controller has
         restarted since `hello`.
         """
-        try:
-            data = self._connection.receive(timeout)
-        except LineLostError as error:
-            raise SilenceError(f"the connection was lost: {error}") from None
+        data = self._connection.receive(timeout)
         now = time.monotonic()
         slept, self._looked = now - self._looked > ASLEEP + timeout, now
         if slept:
@@ -348,11 +339,14 @@ class Session:
     def _check_boot(self, boot: int) -> None:
         if self.capabilities is not None and boot != self.capabilities.boot:
             self.capabilities = None  # raise only once; a new `hello` is necessary
-            self._hold(held=False)  # the controller has lost this session
+            self._connection.holds(held=False)  # the controller has lost this session
             raise ResetError("the controller started anew")
 
-    def _command(self, message: Message, patience: float | None = None) -> Ack | Capabilities:
-        """Send until answered, at increasing intervals, for `patience` (s; default `silence`)."""
+    def command(self, message: Message, patience: float | None = None) -> Ack | Capabilities:
+        """Send until answered, at increasing intervals, for `patience` (s; default `silence`).
+
+        Raises LinkFaultError.
+        """
         kind, body = encode(message)
         if kind in (Kind.ARM, Kind.START) and self.given_up():
             raise SilenceError(GIVEN_UP)
@@ -363,7 +357,7 @@ class Session:
         deadline = now + (self.silence if patience is None else patience)
         wait = FIRST_WAIT
         while now < deadline:
-            self._write(frame)
+            self._connection.write(frame)
             again = min(deadline, now + wait)
             while now < again:
                 self.look(min(POLL, again - now))
@@ -384,9 +378,9 @@ class Session:
             why = printable(answer.text) or answer.code.text
             if answer.code is NakCode.LATCHED:
                 raise StoppedError(self._stop_behind(why))
-            if answer.code is NakCode.BUSY and kind is not Kind.HELLO:
+            if answer.code is NakCode.BUSY:
                 raise HeldError(f"the controller is in use: {why}")
-            raise RefusedError(f"the controller refused {kind.name}: {name}{why}", answer)
+            raise RefusedError(f"the controller refused {kind.name}: {name}{why}", answer.code)
         if answer is None or isinstance(answer, Capabilities) != (kind is Kind.HELLO):
             return None
         if kind is Kind.ARM:
@@ -400,24 +394,6 @@ class Session:
         """The stop for which a command was refused; queried for details, if possible."""
         return self.panic_stop() or PanicStop(0, f"an unknown host; the controller says: {why}")
 
-    def _hold(self, *, held: bool) -> None:
-        try:
-            self._connection.holds(held=held)
-        except LineLostError as error:
-            raise SilenceError(f"the connection was lost: {error}") from None
-
     def _drain(self) -> None:
         while self.look(0.0):
             pass
-
-    def _write(self, data: bytes) -> None:
-        try:
-            self._connection.write(data)
-        except LineLostError as error:
-            raise SilenceError(f"the connection was lost: {error}") from None
-
-    def _connection_wanted(self, trial: int, record: int, *, at_once: bool = False) -> None:
-        try:
-            self._connection.wanted(trial, record, at_once=at_once)
-        except LineLostError as error:
-            raise SilenceError(f"the connection was lost: {error}") from None

@@ -437,21 +437,21 @@ def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
         _does_not_clear(backend, first.count)
         backend.clear_stop(_found(backend).count)
         require(backend.panic_stop() is None, "it is stopped after the stop was cleared")
-        ending = _execute(under_test.possible, backend, StrictRecorder())
+        ending = backend.execute(under_test.possible, StrictRecorder(), lambda: False)
         text = f"after the stop was cleared, the trial ended as {ending.outcome}: {ending.reason}"
         require(ending.outcome is Outcome.COMPLETED, text)
 
 
 def _stopped_in_mid_trial(under_test: BackendUnderTest, backend: Backend) -> None:
     recorder = StrictRecorder(lambda count: _stop(under_test) if count == 1 else None)
-    ending = _execute(under_test.possible, backend, recorder)
+    ending = backend.execute(under_test.possible, recorder, lambda: False)
     message = f"a trial stopped from outside ended as {ending.outcome}, not as interrupted"
     require(ending.outcome is Outcome.INTERRUPTED, message)
 
 
 def _moves_nothing(trial: Trial, backend: Backend) -> None:
     recorder = StrictRecorder()
-    ending = _execute(trial, backend, recorder)
+    ending = backend.execute(trial, recorder, lambda: False)
     require(not recorder.blocks, f"{recorder.blocks} blocks were recorded on a stopped bench")
     message = f"a trial on a stopped bench ended as {ending.outcome}, not as interrupted"
     require(ending.outcome is Outcome.INTERRUPTED, message)
@@ -471,10 +471,6 @@ def _does_not_clear(backend: SupportsExternalStop, count: int) -> None:
         _found(backend)
         return
     raise CheckFailedError(f"clear_stop({count}) cleared another stop than the latest")
-
-
-def _execute(trial: Trial, backend: Backend, recorder: StrictRecorder) -> Ending:
-    return backend.execute(trial, recorder, lambda: False)
 
 
 def _stop(under_test: BackendUnderTest) -> None:

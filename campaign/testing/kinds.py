@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
@@ -16,10 +16,19 @@ from campaign.physics.compensation import compensation_methods
 from campaign.physics.compensation.interface import CompensationMethod
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel
+from campaign.plugins import Kinds
 from campaign.report.formats import formats
 from campaign.report.formats.interface import Format
 
 AnyKind = Experiment | FrictionModel | CompensationMethod | BackendKind | ExportKind | Format
+ROOMS: dict[type, Callable[[], Kinds[Any]]] = {
+    Experiment: experiments,
+    FrictionModel: friction_models,
+    CompensationMethod: compensation_methods,
+    BackendKind: backends,
+    ExportKind: exports,
+    Format: formats,
+}
 
 
 @contextmanager
@@ -27,21 +36,5 @@ def known(*kinds: AnyKind) -> Iterator[None]:
     """Register `kinds` for protocols and benches within the block, as if they were installed."""
     with ExitStack() as stack:
         for kind in kinds:
-            stack.enter_context(_room(kind).including(kind))
+            stack.enter_context(ROOMS[type(kind)]().including(kind))
         yield
-
-
-def _room(kind: AnyKind) -> Any:
-    match kind:
-        case Experiment():
-            return experiments()
-        case FrictionModel():
-            return friction_models()
-        case CompensationMethod():
-            return compensation_methods()
-        case BackendKind():
-            return backends()
-        case ExportKind():
-            return exports()
-        case Format():
-            return formats()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +46,6 @@ class SupervisedEnd:
     """
 
     ending: Ending
-    recording: Recording
     after: int
     made_safe: list[SafeState]
 
@@ -68,10 +67,10 @@ def supervised(
         supervision = Supervision(live=under_test.live)
         conditions = Conditions(between, archive, lambda: False, supervision)
         execute_once(watched or under_test.possible, conditions)
-    ending, file = archive.ending, archive.file
+    ending = archive.file.ending
     if ending is None:
         raise CheckFailedError("the trial was not archived")
-    return SupervisedEnd(ending, file.recording(ending), between.after, between.made_safe)
+    return SupervisedEnd(ending, between.after, between.made_safe)
 
 
 def with_narrow_limit(under_test: BackendUnderTest, recording: Recording) -> tuple[Trial, str]:
@@ -177,29 +176,25 @@ class _Between:
 
 
 class _File(MemoryRecorder):
-    def __init__(self, archive: _Memory) -> None:
-        super().__init__()
-        self._archive = archive
+    ending: Ending | None = None
 
     def finish(self, ending: Ending, started: str, ended: str) -> None:
-        self._archive.ending = ending
+        self.ending = ending
 
     def measure(self, measure: Measure) -> str:
         return ""
 
 
-@dataclass
 class _Memory:
     """An archive of one trial."""
 
-    ending: Ending | None = None
-    file: MemoryRecorder = field(default_factory=MemoryRecorder)
-    folder: Path = Path("memory")
+    folder = Path("memory")
+
+    def __init__(self) -> None:
+        self.file = _File()
 
     def begin(self, trial: Trial, keeping: SampleRetention = KEEP_ALL) -> _File:
-        file = _File(self)
-        self.file = file
-        return file
+        return self.file
 
     def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
         return None

@@ -146,19 +146,14 @@ class Format(Code):
     I16 = 4
 
     @property
-    def size(self) -> int:
-        """Bytes per sample."""
-        return {Format.F64: 8, Format.F32: 4, Format.I32: 4, Format.I16: 2}[self]
-
-    @property
-    def letter(self) -> str:
-        """Format letter of `struct`, after a `<`."""
-        return {Format.F64: "d", Format.F32: "f", Format.I32: "i", Format.I16: "h"}[self]
-
-    @property
     def dtype(self) -> str:
         """Type of numpy, e.g. `<f8`."""
         return {Format.F64: "<f8", Format.F32: "<f4", Format.I32: "<i4", Format.I16: "<i2"}[self]
+
+    @property
+    def size(self) -> int:
+        """Bytes per sample."""
+        return int(self.dtype[-1])
 
 
 class Tag(Code):

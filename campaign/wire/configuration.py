@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from campaign.physics.bench import UNLIMITED
-from campaign.trial import Trial
+from campaign.trial import Trial, leaves
 from campaign.wire.parameters import Value
 
 REHEARSAL = "rehearsal"
@@ -49,13 +49,10 @@ def configuration_of(trial: Trial) -> dict[str, Value]:
     return settings
 
 
-def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Value]]:
+def flatten(tree: Mapping[str, Any]) -> Iterator[tuple[str, Value]]:
     """Every leaf of `tree` with its dotted name, except None."""
-    for key, value in tree.items():
-        name = f"{prefix}{key}"
-        if isinstance(value, Mapping):
-            yield from flatten(value, f"{name}.")
-        elif isinstance(value, list | tuple):
+    for name, value in leaves(tree):
+        if isinstance(value, list | tuple):
             yield name, tuple(float(each) for each in value)
         elif value is not None:
             yield name, value

@@ -3,9 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 from campaign.wire.codes import Fault, Format, Kind, LatchCause, NakCode, Outcome, State
-from campaign.wire.parameters import Item
+from campaign.wire.fields import (
+    F64,
+    U8,
+    U16,
+    U32,
+    Flag,
+    LongText,
+    OptionalF64,
+    Rest,
+    ShortText,
+    Words,
+    listed,
+    read,
+    written,
+)
+from campaign.wire.parameters import Items
 
 
 @dataclass(frozen=True)
@@ -28,31 +45,31 @@ class Capabilities:
         limits: upper bounds of configured limits, SI: `limits.angle` ...
     """
 
-    sequence: int
-    version: int
-    lowest: int
-    highest: int
-    boot: int
+    sequence: U16
+    version: U8
+    lowest: U8
+    highest: U8
+    boot: U32
     state: State
-    heartbeat_timeout: float
-    ring_records: int
-    longest_array: int
-    sample_rate: float
-    name: str
-    firmware: str = ""
-    features: tuple[str, ...] = ()
-    compensations: tuple[str, ...] = ()
-    limits: tuple[Item, ...] = ()
+    heartbeat_timeout: F64
+    ring_records: U32
+    longest_array: U32
+    sample_rate: F64
+    name: ShortText
+    firmware: ShortText = ""
+    features: Words = ()
+    compensations: Words = ()
+    limits: Items = ()
 
 
 @dataclass(frozen=True)
 class Ack:
     """Command `sequence` was executed, now or at its first arrival; `state` after it."""
 
-    sequence: int
+    sequence: U16
     kind: Kind
     state: State
-    boot: int
+    boot: U32
 
 
 @dataclass(frozen=True)
@@ -65,25 +82,28 @@ class Nak:
         text: one sentence for the user.
     """
 
-    sequence: int
-    kind: int
+    sequence: U16
+    kind: U8
     code: NakCode
     state: State
-    name: str = ""
-    text: str = ""
+    name: ShortText = ""
+    text: ShortText = ""
 
 
 @dataclass(frozen=True)
 class Channel:
     """One recorded quantity: value = scale * stored number, in `unit` (SI)."""
 
-    name: str
-    unit: str
-    display_unit: str
-    label: str
-    measured: bool = True
+    name: ShortText
+    unit: ShortText
+    display_unit: ShortText
+    label: ShortText
+    measured: Flag = True
     format: Format = Format.F64
-    scale: float = 1.0
+    scale: F64 = 1.0
+
+
+ChannelList = Annotated[tuple[Channel, ...], listed(written, partial(read, Channel))]
 
 
 @dataclass(frozen=True)
@@ -95,11 +115,11 @@ class Channels:
         sample_rate: sample n is taken at n / sample_rate (Hz).
     """
 
-    sequence: int
-    total: int
-    first: int
-    sample_rate: float
-    channels: tuple[Channel, ...]
+    sequence: U16
+    total: U8
+    first: U8
+    sample_rate: F64
+    channels: ChannelList
 
 
 @dataclass(frozen=True)
@@ -122,18 +142,18 @@ class Status:
 
     state: State
     fault: Fault
-    at_rest: bool
-    drive_on: bool
-    boot: int
-    clock: float
-    heartbeat: int
-    heartbeat_age: float
-    trial: int
-    first_record: int
-    next_record: int
-    ring_used: int
-    bad_frames: int = 0
-    temperature: float | None = None
+    at_rest: Flag
+    drive_on: Flag
+    boot: U32
+    clock: F64
+    heartbeat: U32
+    heartbeat_age: F64
+    trial: U32
+    first_record: U32
+    next_record: U32
+    ring_used: U32
+    bad_frames: U32 = 0
+    temperature: OptionalF64 = None
 
 
 @dataclass(frozen=True)
@@ -144,21 +164,21 @@ class Samples:
         data: packed little-endian, sample by sample; within a sample channel by channel.
     """
 
-    trial: int
-    number: int
-    first: int
-    count: int
-    data: bytes
+    trial: U32
+    number: U32
+    first: U32
+    count: U16
+    data: Rest
 
 
 @dataclass(frozen=True)
 class Event:
     """Record: an event at `time` of the trial (s)."""
 
-    trial: int
-    number: int
-    time: float
-    text: str
+    trial: U32
+    number: U32
+    time: F64
+    text: LongText
 
 
 @dataclass(frozen=True)
@@ -170,22 +190,22 @@ class End:
         safe: whether the axis is confirmed at rest with its drive off.
     """
 
-    trial: int
-    number: int
+    trial: U32
+    number: U32
     outcome: Outcome
     fault: Fault
-    samples: int
-    safe: bool
-    reason: str = ""
+    samples: U32
+    safe: Flag
+    reason: LongText = ""
 
 
 @dataclass(frozen=True)
 class LostRecords:
     """Records `first` to `first + count - 1` are no longer stored, and lost."""
 
-    trial: int
-    first: int
-    count: int
+    trial: U32
+    first: U32
+    count: U32
 
 
 @dataclass(frozen=True)
@@ -198,11 +218,11 @@ class Latch:
         by: sender of the stop, if its SAFE contained it.
     """
 
-    latched: bool
-    count: int
+    latched: Flag
+    count: U32
     cause: LatchCause
-    age: float | None
-    by: str = ""
+    age: OptionalF64
+    by: ShortText = ""
 
 
 @dataclass(frozen=True)
@@ -215,6 +235,6 @@ class Holder:
         host: identity from its HELLO; of the last session if the device is no longer held.
     """
 
-    held: bool
-    age: float | None
-    host: str = ""
+    held: Flag
+    age: OptionalF64
+    host: ShortText = ""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from campaign.wire.parameters import Item
+from campaign.wire.fields import U8, U32, ShortText
+from campaign.wire.parameters import Items
 
 
 @dataclass(frozen=True)
@@ -17,17 +18,17 @@ class Hello:
         host: its identity, for the device's log.
     """
 
-    lowest: int
-    highest: int
-    session: int
-    host: str = ""
+    lowest: U8
+    highest: U8
+    session: U32
+    host: ShortText = ""
 
 
 @dataclass(frozen=True)
 class Set:
     """Add parameters (at least one item) to the configuration."""
 
-    items: tuple[Item, ...]
+    items: Items
 
 
 @dataclass(frozen=True)
@@ -38,14 +39,14 @@ class Arm:
         crc: `configuration_crc` of all SET bodies since the device was idle.
     """
 
-    crc: int
+    crc: U32
 
 
 @dataclass(frozen=True)
 class Start:
     """Start the motion. The host selects `trial` (from 1), which marks every record."""
 
-    trial: int
+    trial: U32
 
 
 @dataclass(frozen=True)
@@ -58,26 +59,26 @@ class Heartbeat:
         session: session of the host; another session frees nothing and does not prevent a timeout.
     """
 
-    counter: int
-    trial: int
-    next: int
-    session: int
+    counter: U32
+    trial: U32
+    next: U32
+    session: U32
 
 
 @dataclass(frozen=True)
 class Resend:
     """Send `count` records from number `first` again; answered by them, or by LOST."""
 
-    trial: int
-    first: int
-    count: int
+    trial: U32
+    first: U32
+    count: U32
 
 
 @dataclass(frozen=True)
 class Release:
     """Every record of an ended trial is stored; the device deletes the trial and becomes idle."""
 
-    trial: int
+    trial: U32
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,8 @@ class Safe:
         host: identity of the sender, for later queries.
     """
 
-    session: int = 0
-    host: str = ""
+    session: U32 = 0
+    host: ShortText = ""
 
 
 @dataclass(frozen=True)
@@ -122,12 +123,12 @@ class Unlatch:
         host: identity of the host, for the device's log.
     """
 
-    count: int
-    host: str = ""
+    count: U32
+    host: ShortText = ""
 
 
 @dataclass(frozen=True)
 class Bye:
     """The host of `session` leaves: the device no longer counts it as present. No answer."""
 
-    session: int
+    session: U32

@@ -1,22 +1,18 @@
 """Every message of the protocol, and its body as bytes.
 
 `encode` converts a message to (kind, body), `decode` the reverse, or raises WireError: every length
-is exact, every code known, every number finite. Times are in seconds, all values SI. `LAYOUTS`
-defines the bodies completely: field by field, in the order of the bytes.
+is exact, every code known, every number finite. Times are in seconds, all values SI. The
+annotations of a message's class define its body (`campaign.wire.fields`).
 """
 
 from __future__ import annotations
 
-import math
-import struct
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from campaign.wire.codes import (
     COMMANDS,
     VERSION,
-    Code,
     Fault,
     Format,
     Kind,
@@ -40,8 +36,8 @@ from campaign.wire.device import (
     Samples,
     Status,
 )
-from campaign.wire.fields import Reader, Writer, clipped
-from campaign.wire.frames import MAX_BODY
+from campaign.wire.fields import Reader, clipped, read, written
+from campaign.wire.frames import MAX_BODY, encode_frame
 from campaign.wire.host import (
     Arm,
     Bye,
@@ -65,8 +61,6 @@ from campaign.wire.parameters import (
     configuration_crc,
     encoded,
     items,
-    packed,
-    read_item,
 )
 
 __all__ = [
@@ -75,10 +69,13 @@ __all__ = [
     "Kind", "Latch", "LatchCause", "LostRecords", "Message", "Nak", "NakCode", "Outcome", "Query",
     "Record", "Release", "Resend", "Safe", "Samples", "Set", "Start", "State", "Status", "Stop",
     "Unlatch", "Value", "WireError", "assembled",
-    "channels_messages", "clipped", "configuration_crc", "decode", "encode", "items",
-    "parameter_messages", "sample_dtype", "sample_size", "sample_struct", "samples_per_record",
+    "channels_messages", "clipped", "configuration_crc", "decode", "encode", "framed", "items",
+    "parameter_messages", "sample_dtype", "sample_size", "samples_per_record",
 ]  # fmt: skip
 
+MOST_MEMBERS = 255
+"""Largest number of members of a list: its length is a u8."""
+M = TypeVar("M")
 Record = Samples | Event | End
 Message = (
     Hello | Set | Arm | Start | Heartbeat | Resend | Release | Stop | Safe | Clear | Query
@@ -88,197 +85,40 @@ Message = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Writer and reader of one kind of field."""
-
-    write: Callable[[Writer, Any], object]
-    read: Callable[[Reader], Any]
-
-
-def _integer(letter: str) -> Layout:
-    return Layout(lambda w, value: w.number(letter, value), lambda r: r.integer(letter))
-
-
-def _code(kind: type[Code]) -> Layout:
-    return Layout(lambda w, value: w.number("B", kind(value)), lambda r: r.code(kind))
-
-
-def _write_items(writer: Writer, listed: tuple[Item, ...]) -> None:
-    writer.number("B", len(listed))
-    for item in listed:
-        writer.data(encoded(item))
-
-
-def _read_items(reader: Reader) -> tuple[Item, ...]:
-    return tuple(read_item(reader) for _ in range(reader.integer("B")))
-
-
-def _write_channels(writer: Writer, channels: tuple[Channel, ...]) -> None:
-    writer.number("B", len(channels))
-    for c in channels:
-        writer.text(c.name).text(c.unit).text(c.display_unit).text(c.label)
-        writer.number("B", c.measured).number("B", c.format).finite(c.scale)
-
-
-def _read_channels(reader: Reader) -> tuple[Channel, ...]:
-    return tuple(
-        Channel(
-            reader.text(),
-            reader.text(),
-            reader.text(),
-            reader.text(),
-            reader.flag(),
-            reader.code(Format),
-            reader.finite(),
-        )
-        for _ in range(reader.integer("B"))
-    )
-
-
-def _write_optional(writer: Writer, value: float | None) -> None:
-    if value is None:
-        writer.number("d", math.nan)
-    else:
-        writer.finite(value)
-
-
-def _read_optional(reader: Reader) -> float | None:
-    value = reader.real()
-    if math.isinf(value):
-        raise WireError("an infinite number")
-    return None if math.isnan(value) else value
-
-
-U8, U16, U32 = _integer("B"), _integer("H"), _integer("I")
-F64 = Layout(lambda w, value: w.finite(value), lambda r: r.finite())
-OPTIONAL = Layout(_write_optional, _read_optional)
-FLAG = Layout(lambda w, value: w.number("B", bool(value)), lambda r: r.flag())
-SHORT = Layout(lambda w, value: w.text(value), lambda r: r.text())
-LONG = Layout(lambda w, value: w.text(value, "H"), lambda r: r.text("H"))
-WORDS = Layout(lambda w, value: w.texts(value), lambda r: r.texts())
-ITEMS = Layout(_write_items, _read_items)
-CHANNELS = Layout(_write_channels, _read_channels)
-REST = Layout(lambda w, value: w.data(value), lambda r: r.data(r.left))
-STATE, FAULT, OUTCOME = _code(State), _code(Fault), _code(Outcome)
-KIND, NAK, CAUSE = _code(Kind), _code(NakCode), _code(LatchCause)
-
-LAYOUTS: Mapping[Kind, tuple[type[Any], tuple[tuple[str, Layout], ...]]] = {
-    Kind.HELLO: (
-        Hello,
-        (("lowest", U8), ("highest", U8), ("session", U32), ("host", SHORT)),
-    ),
-    Kind.SET: (Set, (("items", ITEMS),)),
-    Kind.ARM: (Arm, (("crc", U32),)),
-    Kind.START: (Start, (("trial", U32),)),
-    Kind.HEARTBEAT: (
-        Heartbeat,
-        (("counter", U32), ("trial", U32), ("next", U32), ("session", U32)),
-    ),
-    Kind.RESEND: (Resend, (("trial", U32), ("first", U32), ("count", U32))),
-    Kind.RELEASE: (Release, (("trial", U32),)),
-    Kind.STOP: (Stop, ()),
-    Kind.SAFE: (Safe, (("session", U32), ("host", SHORT))),  # or less: see `_safe`
-    Kind.CLEAR: (Clear, ()),
-    Kind.QUERY: (Query, ()),
-    Kind.UNLATCH: (Unlatch, (("count", U32), ("host", SHORT))),
-    Kind.BYE: (Bye, (("session", U32),)),
-    Kind.CAPABILITIES: (
-        Capabilities,
-        (
-            ("sequence", U16),
-            ("version", U8),
-            ("lowest", U8),
-            ("highest", U8),
-            ("boot", U32),
-            ("state", STATE),
-            ("heartbeat_timeout", F64),
-            ("ring_records", U32),
-            ("longest_array", U32),
-            ("sample_rate", F64),
-            ("name", SHORT),
-            ("firmware", SHORT),
-            ("features", WORDS),
-            ("compensations", WORDS),
-            ("limits", ITEMS),
-        ),
-    ),
-    Kind.ACK: (Ack, (("sequence", U16), ("kind", KIND), ("state", STATE), ("boot", U32))),
-    Kind.NAK: (
-        Nak,
-        (
-            ("sequence", U16),
-            ("kind", U8),
-            ("code", NAK),
-            ("state", STATE),
-            ("name", SHORT),
-            ("text", SHORT),
-        ),
-    ),
-    Kind.CHANNELS: (
-        Channels,
-        (
-            ("sequence", U16),
-            ("total", U8),
-            ("first", U8),
-            ("sample_rate", F64),
-            ("channels", CHANNELS),
-        ),
-    ),
-    Kind.STATUS: (
-        Status,
-        (
-            ("state", STATE),
-            ("fault", FAULT),
-            ("at_rest", FLAG),
-            ("drive_on", FLAG),
-            ("boot", U32),
-            ("clock", F64),
-            ("heartbeat", U32),
-            ("heartbeat_age", F64),
-            ("trial", U32),
-            ("first_record", U32),
-            ("next_record", U32),
-            ("ring_used", U32),
-            ("bad_frames", U32),
-            ("temperature", OPTIONAL),
-        ),
-    ),
-    Kind.SAMPLES: (
-        Samples,
-        (("trial", U32), ("number", U32), ("first", U32), ("count", U16), ("data", REST)),
-    ),
-    Kind.EVENT: (Event, (("trial", U32), ("number", U32), ("time", F64), ("text", LONG))),
-    Kind.END: (
-        End,
-        (
-            ("trial", U32),
-            ("number", U32),
-            ("outcome", OUTCOME),
-            ("fault", FAULT),
-            ("samples", U32),
-            ("safe", FLAG),
-            ("reason", LONG),
-        ),
-    ),
-    Kind.LOST: (LostRecords, (("trial", U32), ("first", U32), ("count", U32))),
-    Kind.LATCH: (
-        Latch,
-        (("latched", FLAG), ("count", U32), ("cause", CAUSE), ("age", OPTIONAL), ("by", SHORT)),
-    ),
-    Kind.HOLDER: (Holder, (("held", FLAG), ("age", OPTIONAL), ("host", SHORT))),
+MESSAGES: Mapping[Kind, type[Any]] = {
+    Kind.HELLO: Hello,
+    Kind.SET: Set,
+    Kind.ARM: Arm,
+    Kind.START: Start,
+    Kind.HEARTBEAT: Heartbeat,
+    Kind.RESEND: Resend,
+    Kind.RELEASE: Release,
+    Kind.STOP: Stop,
+    Kind.SAFE: Safe,  # its body may be shorter: see `_safe`
+    Kind.CLEAR: Clear,
+    Kind.QUERY: Query,
+    Kind.UNLATCH: Unlatch,
+    Kind.BYE: Bye,
+    Kind.CAPABILITIES: Capabilities,
+    Kind.ACK: Ack,
+    Kind.NAK: Nak,
+    Kind.CHANNELS: Channels,
+    Kind.STATUS: Status,
+    Kind.SAMPLES: Samples,
+    Kind.EVENT: Event,
+    Kind.END: End,
+    Kind.LOST: LostRecords,
+    Kind.LATCH: Latch,
+    Kind.HOLDER: Holder,
 }
-KINDS: Mapping[type[Any], Kind] = {made: kind for kind, (made, _) in LAYOUTS.items()}
+KINDS: Mapping[type[Any], Kind] = {made: kind for kind, made in MESSAGES.items()}
 
 
 def encode(message: Message) -> tuple[Kind, bytes]:
     """Type and body of `message`. Raises WireError if it cannot be sent."""
     kind = KINDS[type(message)]
     _check(message)
-    writer = Writer()
-    for name, layout in LAYOUTS[kind][1]:
-        layout.write(writer, getattr(message, name))
-    body = b"" if message == Safe() else writer.done()  # without a session: as in version 1
+    body = b"" if message == Safe() else written(message)  # without a session: as in version 1
     if len(body) > MAX_BODY:
         raise WireError(f"a {kind.name} of {len(body)} bytes; a frame carries {MAX_BODY}")
     return kind, body
@@ -286,16 +126,21 @@ def encode(message: Message) -> tuple[Kind, bytes]:
 
 def decode(kind: int, body: bytes) -> Message:
     """The message. Raises WireError if the type is unknown or the body does not match it."""
-    if kind not in LAYOUTS:
+    if kind not in MESSAGES:
         raise WireError(f"no message has the type 0x{kind:02x}")
     if kind == Kind.SAFE:
         return _safe(body)
-    made, layouts = LAYOUTS[Kind(kind)]
     reader = Reader(body)
-    message: Message = made(**{name: layout.read(reader) for name, layout in layouts})
+    message: Message = read(MESSAGES[Kind(kind)], reader)
     reader.end()
     _check(message)
     return message
+
+
+def framed(message: Message, sequence: int = 0) -> bytes:
+    """`message` as a frame with delimiters. Raises WireError if it cannot be sent."""
+    kind, body = encode(message)
+    return encode_frame(kind, sequence, body)
 
 
 def _safe(body: bytes) -> Safe:
@@ -340,33 +185,33 @@ def _check(message: Message) -> None:
 
 def parameter_messages(parameters: Mapping[str, Value]) -> list[Set]:
     """`parameters` in as few SET messages as possible, in order; arrays cut into slices."""
-    return [Set(batch) for batch in packed(items(parameters))]
+    return [Set(batch) for batch in _packed(items(parameters), encoded, 1)]
 
 
 def channels_messages(
     sequence: int, sample_rate: float, channels: Iterable[Channel]
 ) -> list[Channels]:
     """The CHANNELS messages that answer ARM number `sequence`, each within a frame."""
-    listed = tuple(channels)
-    messages: list[Channels] = []
-    first = 0
-    while first < len(listed):
-        last = len(listed)
-        while True:
-            message = Channels(sequence, len(listed), first, sample_rate, listed[first:last])
-            writer = Writer()
-            _write_channels(writer, message.channels)
-            if len(writer.done()) + 12 <= MAX_BODY or last == first + 1:
-                break
-            last -= 1
-        messages.append(message)
-        first = last
+    batches = _packed(tuple(channels), written, 13)
+    total, first, messages = sum(map(len, batches)), 0, []
+    for batch in batches:
+        messages.append(Channels(sequence, total, first, sample_rate, batch))
+        first += len(batch)
     return messages
 
 
-def sample_struct(channels: Iterable[Channel]) -> struct.Struct:
-    """Layout of one sample of all channels."""
-    return struct.Struct("<" + "".join(channel.format.letter for channel in channels))
+def _packed(members: Iterable[M], write: Callable[[M], bytes], head: int) -> list[tuple[M, ...]]:
+    """`members` in as few messages as possible; `head`: bytes of a message without members."""
+    batches: list[list[M]] = []
+    size = 0
+    for member in members:
+        length = len(write(member))
+        if not batches or size + length > MAX_BODY or len(batches[-1]) == MOST_MEMBERS:
+            batches.append([])
+            size = head
+        batches[-1].append(member)
+        size += length
+    return [tuple(batch) for batch in batches]
 
 
 def sample_dtype(channels: Iterable[Channel]) -> list[tuple[str, str]]:

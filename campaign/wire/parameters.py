@@ -10,10 +10,10 @@ import re
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 from campaign.wire.codes import Tag, WireError
-from campaign.wire.fields import Reader, Writer
-from campaign.wire.frames import MAX_BODY
+from campaign.wire.fields import Reader, Writer, listed
 
 NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 LONGEST_NAME = 64
@@ -64,31 +64,14 @@ def items(parameters: Mapping[str, Value]) -> list[Item]:
     return made
 
 
-def packed(listed: Iterable[Item]) -> list[tuple[Item, ...]]:
-    """`listed` in as few messages as possible, in order: one tuple of items for each SET."""
-    messages: list[tuple[Item, ...]] = []
-    batch: list[Item] = []
-    size = 1
-    for item in listed:
-        length = len(encoded(item))
-        if batch and (size + length > MAX_BODY or len(batch) == 255):
-            messages.append(tuple(batch))
-            batch, size = [], 1
-        batch.append(item)
-        size += length
-    if batch:
-        messages.append(tuple(batch))
-    return messages
-
-
-def assembled(listed: Iterable[Item]) -> dict[str, Value]:
+def assembled(pieces: Iterable[Item]) -> dict[str, Value]:
     """Whole parameters from items, in order of first appearance; a later scalar replaces.
 
     Raises WireError if the pieces of an array are not contiguous from 0 to its total.
     """
     whole: dict[str, Value] = {}
     totals: dict[str, int] = {}
-    for item in listed:
+    for item in pieces:
         if not isinstance(item.value, ArraySlice):
             whole[item.name] = item.value
             totals.pop(item.name, None)
@@ -119,8 +102,7 @@ def configuration_crc(bodies: Iterable[bytes]) -> int:
 def encoded(item: Item) -> bytes:
     """The bytes of one item. Raises WireError if name or value cannot be sent."""
     name, value = item.name, item.value
-    if len(name) > LONGEST_NAME or not NAME.fullmatch(name):
-        raise WireError(f"{name!r} is no parameter name")
+    _check_name(name)
     writer = Writer().text(name)
     if isinstance(value, bool):
         writer.number("B", Tag.BOOL).number("B", value)
@@ -144,9 +126,16 @@ def encoded(item: Item) -> bytes:
 def read_item(reader: Reader) -> Item:
     """The next item of a body."""
     name = reader.text()
+    _check_name(name)
+    return Item(name, _read_value(name, reader))
+
+
+Items = Annotated[tuple[Item, ...], listed(encoded, read_item)]
+
+
+def _check_name(name: str) -> None:
     if len(name) > LONGEST_NAME or not NAME.fullmatch(name):
         raise WireError(f"{name!r} is no parameter name")
-    return Item(name, _read_value(name, reader))
 
 
 def _read_value(name: str, reader: Reader) -> Scalar | ArraySlice:

@@ -15,6 +15,7 @@ from campaign.backends.sim import BACKEND, SimBackend, SimOptions
 from campaign.cli import compile_engine
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.physics import lanes, machine_code
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
@@ -202,7 +203,7 @@ def test_a_run_is_the_same_together_and_alone(
     for fewest, workers in ((4, 1), (4, 2), (1000, 2)):
         monkeypatch.setattr(SimBackend, "fewest_together", fewest)
         results = tmp_path / f"{fewest}-{workers}"
-        assert run_protocol(Request(str(protocol)), results, workers=workers, report=False) == 0
+        assert run_protocol(Request(str(protocol)), results, RunOptions(workers=workers)) == 0
         runs.append(open_run(next(results.glob("*.nxs"))))
         sizes.append(sorted(blocks))
         blocks.clear()

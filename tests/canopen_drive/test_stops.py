@@ -24,8 +24,8 @@ from campaign.canopen_drive.ends import End
 from campaign.canopen_drive.line import Desk, DirectLine, Latch
 from campaign.canopen_drive.relay import Relay
 from campaign.canopen_drive.settings import set_pdos
-from campaign.link.safe import safe_frame
 from campaign.recording import Outcome, SafeState
+from campaign.wire.messages import Safe, framed
 from tests.canopen_drive.rig import LIMITS, backend, channel, execute, trial
 from tests.canopen_drive.simulated import SimulatedDrive
 
@@ -191,15 +191,15 @@ def test_no_quick_stop_follows_a_stop_that_was_cleared(tmp_path: Path) -> None:
             raise DriveError("nothing")
 
     desk = Desk(Resting(), latch)  # type: ignore[arg-type]
-    desk.feed(safe_frame(1, "ada", 1))
+    desk.feed(framed(Safe(1, "ada"), 1))
     assert begun.wait(60.0)
     threading.Timer(0.3, go_on.set).start()
     assert latch.clear(1)
     assert told == ["quick stop"]
-    desk.feed(safe_frame(1, "ada", 2))  # sent before the stop was cleared
+    desk.feed(framed(Safe(1, "ada"), 2))  # sent before the stop was cleared
     latch.wait()
     assert told == ["quick stop"]
-    desk.feed(safe_frame(2, "bob", 1))
+    desk.feed(framed(Safe(2, "bob"), 1))
     latch.wait()
     assert len(told) == 2
 
@@ -222,7 +222,7 @@ def test_a_full_disk_does_not_keep_the_drive_moving(monkeypatch: pytest.MonkeyPa
             drive.control(word)
         direct = DirectLine(address_of(f"can://virtual/{name}?node=5"))
         with pytest.raises(OSError, match="no space"):
-            direct.write(safe_frame(1, "ada", 1))
+            direct.write(framed(Safe(1, "ada"), 1))
         direct.close()
         assert drive.at_rest_and_off()
 

@@ -10,6 +10,7 @@ import pytest
 
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.comparison import run_comparison
 from campaign.experiments import experiments
 from campaign.experiments.interface import bench_of
@@ -80,6 +81,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _run(path: Path, results: Path, name: str, settings: tuple[str, ...], **more: Any) -> None:
     request = Request(str(path), more.get("only", ()), settings, "sim")
     before = set(results.glob("*.nxs"))
-    assert run_protocol(request, results, workers=1, report=False) == 0
+    assert run_protocol(request, results, RunOptions(workers=1)) == 0
     (made,) = set(results.glob("*.nxs")) - before
     made.rename(results / f"{name}.nxs")

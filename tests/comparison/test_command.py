@@ -21,7 +21,7 @@ from campaign.references.verdict import Verdict
 
 def typed(results: Path, *names: str, **more: object) -> tuple[Path, ExitCode]:
     output = more.get("output")
-    return compare_archives(names, results, output, (), open_it=False)  # type: ignore[arg-type]
+    return compare_archives(names, results, output, ())  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

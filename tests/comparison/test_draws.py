@@ -80,7 +80,7 @@ def test_the_terminal_says_what_differs_in_the_bench_behind_the_verdict(
     results: Path, tmp_path: Path, monkeypatch, capsys
 ):
     monkeypatch.setattr(command, "write_comparison", lambda found, output, *_: output)
-    command.compare_archives(("before", "after"), results, tmp_path, (), open_it=False)
+    command.compare_archives(("before", "after"), results, tmp_path, ())
     out = capsys.readouterr().out
     change = "map: bench: friction.load.coulomb_torque: 16.12 N·m -> 17.732 N·m"
     assert out.index("numbers are found in both runs") < out.index(change) < out.index("finding\t")

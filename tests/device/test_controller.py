@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from campaign.device.controller import Controller
 from campaign.device.faults import parse_faults
 from campaign.device.latch import new_memory
 from campaign.device.machine import DeviceLog, Setup
+from campaign.device.producer import AHEAD
 from campaign.protocol.bench_file import load_bench
 from campaign.recording import MemoryRecorder
 from campaign.signals import Sine
@@ -136,7 +138,10 @@ class Rig:
         assert isinstance(self.configure(what or trial()), Ack)
         armed = self.controller.machine._armed
         assert armed is not None
-        assert armed.producer.wait(60.0)
+        deadline = time.monotonic() + 60.0
+        while not (armed.producer.finished or armed.producer.available >= AHEAD):
+            assert time.monotonic() < deadline
+            time.sleep(0.001)
         assert isinstance(self.send(Start(9)), Ack)
         self.controller.tick()
 

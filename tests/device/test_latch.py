@@ -271,7 +271,7 @@ def test_a_first_start_is_refused_where_it_may_be_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], told: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("campaign.cli.device._serve", lambda *arguments: 0)  # which never ends
+    monkeypatch.setattr("campaign.cli.device.Server.serve", lambda server: 0)  # which never ends
     Path("there").write_text("a stop", encoding="utf-8")
     done = CliRunner().invoke(app, ["device", "--bench", "platform", "--new-latch", *options])
     assert isinstance(done.exception, UsageError)

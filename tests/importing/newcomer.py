@@ -9,6 +9,7 @@ from typing import Any
 
 import campaign
 from campaign.cli.import_command import import_recordings
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode
 from campaign.importing.guess import guess, mapping_text
 
@@ -77,7 +78,7 @@ def imported(files: list[Path], **completing: Any) -> Any:
     (folder / "rig.toml").write_text(rig(text), encoding="utf-8")
     (folder / "mapping.toml").write_text(completed(text, **completing), encoding="utf-8")
     mapping = str(folder / "mapping.toml")
-    code = import_recordings([mapping], folder / "results", workers=1, report=True)
+    code = import_recordings([mapping], folder / "results", RunOptions(workers=1, report=True))
     assert code is ExitCode.DONE
     assert next((folder / "results").glob("*-report")) / "report.html"
     return campaign.open(next((folder / "results").glob("*-mapping.nxs")))

@@ -19,6 +19,7 @@ import campaign
 from campaign.cli.import_command import import_recordings
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode
 from tests.importing.elsewhere import DEGREES, Foreign, columns_toml, written
 
@@ -70,13 +71,15 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Any:
     text = "\n".join(f'[[test]]\nname = "{name}"\n{test}' for name, test in TESTS.items())
     (folder / "plan.toml").write_text(text)
     request = Request(str(folder / "plan.toml"))
-    assert run_protocol(request, folder / "results", workers=2, report=False) is ExitCode.DONE
+    assert run_protocol(request, folder / "results", RunOptions(workers=2)) is ExitCode.DONE
     return campaign.open(next((folder / "results").glob("*.nxs")))
 
 
 def imported(folder: Path, mapping: str) -> Any:
     (folder / "mapping.toml").write_text('published = "none"\n' + mapping, encoding="utf-8")
-    code = import_recordings([str(folder / "mapping.toml")], folder / "results", workers=2)
+    code = import_recordings(
+        [str(folder / "mapping.toml")], folder / "results", RunOptions(workers=2)
+    )
     assert code is ExitCode.DONE
     return campaign.open(next((folder / "results").glob("*.nxs")))
 

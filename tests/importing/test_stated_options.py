@@ -11,6 +11,7 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.cli.import_command import import_recordings
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode
 
 MAPPING = """\
@@ -51,7 +52,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         rows = [f"{t:.3f}\t{value:.9g}" for t, value in zip(time, values, strict=True)]
         (folder / name).write_text("\n".join(["t\tvalue", *rows]))
     (folder / "m.toml").write_text(MAPPING)
-    done = import_recordings([str(folder / "m.toml")], folder / "results", report=True)
+    done = import_recordings([str(folder / "m.toml")], folder / "results", RunOptions(report=True))
     assert done is ExitCode.DONE
     return folder / "results"
 

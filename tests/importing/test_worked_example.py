@@ -15,6 +15,7 @@ from scipy.io import savemat
 
 import campaign
 from campaign.cli.import_command import import_recordings
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode
 from campaign.importing.guess import guess, mapping_text
 from tests.importing import rig
@@ -36,7 +37,9 @@ def imported(folder: Path) -> Any:
     _, stand, mapping = blocks()
     (folder / "emps-rig.toml").write_text(stand, encoding="utf-8")
     (folder / "emps.toml").write_text(mapping, encoding="utf-8")
-    code = import_recordings([str(folder / "emps.toml")], folder / "results", report=True)
+    code = import_recordings(
+        [str(folder / "emps.toml")], folder / "results", RunOptions(report=True)
+    )
     assert code is ExitCode.DONE
     return campaign.open(next((folder / "results").glob("*-emps.nxs")))
 

@@ -12,7 +12,8 @@ import time
 import pytest
 
 from campaign.errors import UsageError
-from campaign.link.connection import Connection, LineLostError
+from campaign.link.connection import Connection
+from campaign.link.errors import SilenceError
 from campaign.link.port import open_port
 from campaign.link.relay import Relay
 from campaign.wire.codes import Fault, Kind, State
@@ -173,7 +174,7 @@ def test_a_line_that_is_cut_is_an_error_and_no_hang(line) -> None:
         while True:
             connection.receive(5.0)
 
-    with pytest.raises(LineLostError):
+    with pytest.raises(SilenceError, match="connection was lost"):
         until_lost()
 
 

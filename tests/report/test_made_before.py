@@ -35,7 +35,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def report(run: Path, output: Path, *formats: str, **options: object) -> Path:
     """The report's folder, made as the command makes it."""
     templates = options.pop("templates", None)
-    more = {"open_it": False, "formats": formats} | options
+    more = {"formats": formats} | options
     page, code = report_run(str(run), run.parent, output, templates, **more)
     assert code == ExitCode.DONE
     return page.parent

@@ -416,16 +416,14 @@ def test_a_laboratory_has_its_own_trial_page(
 
 
 def test_the_command_makes_them(made: Path, tmp_path: Path) -> None:
-    path, code = report_run(
-        str(made), tmp_path, tmp_path / "out", None, open_it=False, trials="failed"
-    )
+    path, code = report_run(str(made), tmp_path, tmp_path / "out", None, trials="failed")
     assert code == ExitCode.NO_RESULT  # made by hand, without the channel of its kind
     assert sorted(each.name for each in (path.parent / "trials").iterdir()) == [
         "trial-00002.html",
         "trial-00003.html",
     ]
     with pytest.raises(UsageError, match="there is no trial 5"):
-        report_run(str(made), tmp_path, tmp_path / "no", None, open_it=False, trials="5")
+        report_run(str(made), tmp_path, tmp_path / "no", None, trials="5")
     assert not (tmp_path / "no").exists()
 
 

@@ -13,6 +13,7 @@ from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request
 from campaign.cli.resume import resume_run
 from campaign.cli.run import Remarks, run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode
 from campaign.recording import Ending
 from tests.system.user import write
@@ -43,9 +44,7 @@ class Laboratory:
         code = run_protocol(
             Request(str(self.protocol), **request),
             results,
-            workers=workers,
-            report=False,
-            yes=True,
+            RunOptions(workers, yes=True),
             remarks=remarks,
         )
         (archive,) = set(results.glob("*.nxs")) - before
@@ -72,9 +71,11 @@ class Laboratory:
 
     def resume(self, archive: Path, *, accept: bool = False) -> ExitCode:
         return resume_run(
-            str(archive), archive.parent, accept_changes=accept, workers=1, report=False,
-            port=None, yes=True,
-        )  # fmt: skip
+            str(archive),
+            archive.parent,
+            RunOptions(workers=1, yes=True),
+            accept_changes=accept,
+        )
 
 
 def disturb(patch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from campaign.cli.plan import show_plan
 from campaign.cli.prepare import Request
 from campaign.cli.resume import resume_run
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
 from campaign.protocol import load_protocol, make_plan
@@ -113,7 +114,7 @@ def test_plan_and_run_refuse_what_the_backend_is_known_not_to_record(
         assert word in said
     assert refused.value.exit_code is ExitCode.USAGE
     with pytest.raises(UsageError, match="does not record"):
-        run_protocol(request, tmp_path / "results", workers=1, report=False)
+        run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     assert not bench.executed
     assert not (tmp_path / "results").exists()
     show_plan(Request(request.protocol, only=("sea",)), tmp_path / "results", as_json=False)
@@ -126,7 +127,7 @@ def test_a_bench_that_tells_only_when_connected_is_refused_before_it_moves(
     request = Request(str(write(tmp_path, SEA)))
     show_plan(request, tmp_path / "results", as_json=False)  # it does not know
     with pytest.raises(UsageError, match=r"pointing_error \(integral of.*\n.*was moved"):
-        run_protocol(request, tmp_path / "results", workers=1, report=False)
+        run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     assert (bench.executed, bench.made_safe) == (0, 1)
     assert not (tmp_path / "results").exists()
 
@@ -136,7 +137,7 @@ def test_a_bench_that_does_not_tell_is_taken_at_its_word(
 ):
     monkeypatch.setattr(SimBackend, "channels", lambda backend, trial: None)
     request = Request(str(write(tmp_path, SEA)))
-    code = run_protocol(request, tmp_path / "results", workers=1, report=False)
+    code = run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     assert code is ExitCode.DONE
 
 
@@ -156,17 +157,17 @@ def test_resume_asks_for_what_is_left_and_for_no_more(
 
     with monkeypatch.context() as patched:
         patched.setattr(SimBackend, "execute", stop_in_the_map)
-        run_protocol(request, results, workers=1, report=False)
+        run_protocol(request, results, RunOptions(workers=1))
     (path,) = results.glob("*.nxs")
-    again = {"accept_changes": False, "workers": 1, "report": False, "port": None, "yes": True}
+    again = RunOptions(workers=1, yes=True)
     for unconnected in (True, False):
         with monkeypatch.context() as patched:
             bench = Bench("drive_torque", unconnected=unconnected).put_in_place(patched)
             with pytest.raises(UsageError, match=r"trial-0000[45] .* requires drive_torque"):
-                resume_run(str(path), results, **again)
+                resume_run(str(path), results, again)
             assert not bench.executed
     monkeypatch.setattr(SimBackend, "channels", lambda backend, trial: ALL - {"pointing_error"})
-    assert resume_run(str(path), results, **again) is ExitCode.DONE
+    assert resume_run(str(path), results, again) is ExitCode.DONE
 
 
 def test_a_plan_says_what_an_optional_channel_costs(

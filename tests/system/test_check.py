@@ -12,6 +12,7 @@ from campaign.cli.check import check_bench
 from campaign.cli.plan import show_plan
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode, LimitError, ProtocolError, UsageError
 from campaign.resources import protocols_folder
 
@@ -96,7 +97,7 @@ def test_plan_and_run_refuse_an_unstable_loop(
         show_plan(request, tmp_path / "results", as_json=False)
     assert "loop: UNSTABLE" in capsys.readouterr().out  # it is shown all the same
     with pytest.raises(LimitError, match="the loop is unstable in 1 test"):
-        run_protocol(request, tmp_path / "results", workers=1, report=False)
+        run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     assert not (tmp_path / "results").exists()
 
 

@@ -14,6 +14,7 @@ from campaign.backends.sim import SimBackend
 from campaign.cli.ask import NotStartedError
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import DEFAULTS, RunOptions
 from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.safety import AbortedError
 from campaign.recording import Ending, Outcome, SafeState
@@ -46,7 +47,7 @@ def run(
 
     monkeypatch.setattr("campaign.cli.report.report_run", report_run)
     request = Request(str(write(folder, SEA)))
-    return run_protocol(request, folder / "results", workers=1, report=True)
+    return run_protocol(request, folder / "results", RunOptions(workers=1, report=True))
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_a_stop_while_the_bench_is_being_connected_is_an_orderly_one(
         SimBackend, "make_safe", lambda backend: asked_to_rest.append(1) or SafeState.CONFIRMED
     )
     request = Request(str(write(tmp_path, SEA)))
-    code = run_protocol(request, tmp_path / "results", workers=1, report=False)
+    code = run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     assert code is ExitCode.INTERRUPTED
     assert asked_to_rest == [1]
     assert capsys.readouterr().out.endswith(".nxs\n")
@@ -153,7 +154,7 @@ def test_results_that_cannot_be_kept_are_said_before_a_bench_is_looked_for(
     (tmp_path / "results").write_text("no folder")
     request = Request(str(write(tmp_path, SEA)))
     with pytest.raises(UsageError, match="is not a folder"):
-        run_protocol(request, tmp_path / "results", workers=1, report=False)
+        run_protocol(request, tmp_path / "results", RunOptions(workers=1))
 
 
 def test_an_archive_that_cannot_be_begun_is_said_with_the_bench_at_rest(
@@ -167,7 +168,7 @@ def test_an_archive_that_cannot_be_begun_is_said_with_the_bench_at_rest(
     monkeypatch.setattr(RunWriter, "create", no_room)
     request = Request(str(write(tmp_path, SEA)))
     with pytest.raises(UsageError, match="no room"):
-        run_protocol(request, tmp_path / "results", workers=1, report=False)
+        run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     assert asked_to_rest == [1]
     assert "the port is gone" in capsys.readouterr().err
 
@@ -186,7 +187,7 @@ def test_a_run_that_is_stopped_at_once_says_what_is_kept_and_how_to_go_on(
     monkeypatch.chdir(tmp_path)
     request = Request(str(write(tmp_path, SEA)))
     with pytest.raises(AbortedError) as aborted:
-        run_protocol(request, Path("results"), workers=1, report=False)
+        run_protocol(request, Path("results"), RunOptions(workers=1))
     (folder,) = (tmp_path / "results").glob("*.partial")
     said = str(aborted.value)
     assert f"the finished trials are in results/{folder.name}" in said
@@ -211,15 +212,15 @@ def test_a_real_bench_does_not_move_before_somebody_says_so(
     results = tmp_path / "results"
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))  # no terminal, whatever it holds
     with pytest.raises(UsageError, match="--yes"):
-        run_protocol(request, results, workers=None, report=False)
+        run_protocol(request, results, DEFAULTS)
     monkeypatch.setattr("campaign.cli.ask.has_terminal", lambda: True)
     monkeypatch.setattr("sys.stdin", io.StringIO("no\n"))
     with pytest.raises(NotStartedError, match="nothing has moved"):
-        run_protocol(request, results, workers=None, report=False)
+        run_protocol(request, results, DEFAULTS)
     assert not results.exists()
     assert "sea: 2 trials" in capsys.readouterr().err
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
-    assert run_protocol(request, results, workers=None, report=False) is ExitCode.DONE
+    assert run_protocol(request, results, DEFAULTS) is ExitCode.DONE
     request = Request(str(write(tmp_path, SEA)))
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
-    assert run_protocol(request, results, workers=None, report=False, yes=True) is ExitCode.DONE
+    assert run_protocol(request, results, RunOptions(yes=True)) is ExitCode.DONE

@@ -12,6 +12,7 @@ from campaign.archive import open_run
 from campaign.cli.prepare import Request, prepare
 from campaign.cli.rerun import rerun_trial
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.decisions import extremes
@@ -36,7 +37,7 @@ PLAIN = Cause("plain", "it is a test")()
 def executed(folder: Path, keep: str, protocol: str = NOISY) -> Path:
     results = folder / f"results-{keep}"
     request = Request(str(write(folder, protocol)), changes=(f"keep={keep}",), seed=7)
-    assert run_protocol(request, results, workers=2, report=False) is ExitCode.DONE
+    assert run_protocol(request, results, RunOptions(workers=2)) is ExitCode.DONE
     return next(results.glob("*.nxs"))
 
 

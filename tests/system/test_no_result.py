@@ -39,9 +39,7 @@ def archived(folder: Path, kind: Experiment) -> RunReader:
 
 def report(reader: RunReader, kind: Experiment, *, anew: bool = False) -> ExitCode:
     with experiments().including(kind):
-        _, code = report_run(
-            str(reader.path), reader.path.parent, None, None, open_it=False, measure_anew=anew
-        )
+        _, code = report_run(str(reader.path), reader.path.parent, None, None, measure_anew=anew)
     return code
 
 

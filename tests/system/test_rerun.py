@@ -12,6 +12,7 @@ from campaign.archive import open_run
 from campaign.cli.prepare import Request
 from campaign.cli.rerun import _error, rerun_trial
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode, UsageError
 from campaign.execution import provenance
 from campaign.execution.recording_difference import changes, differences
@@ -27,7 +28,7 @@ from tests.system.user import SEA, write
 @pytest.fixture
 def archive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     request = Request(str(write(tmp_path, SEA)))
-    run_protocol(request, tmp_path / "results", workers=1, report=False)
+    run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     capsys.readouterr()
     return next((tmp_path / "results").glob("*.nxs"))
 
@@ -64,7 +65,7 @@ def older(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> Path:
         grid, "_choice", lambda bench, task: StepChoice(1e-3 / 32, 1e-3 / 32, "older")
     )
     request = Request(str(write(tmp_path, SEA)))
-    run_protocol(request, tmp_path / "results", workers=1, report=False)
+    run_protocol(request, tmp_path / "results", RunOptions(workers=1))
     monkeypatch.undo()
     capsys.readouterr()
     return next((tmp_path / "results").glob("*.nxs"))
@@ -148,7 +149,7 @@ def test_friction_of_several_interfaces_is_added_in_the_order_of_its_file(
 ):
     """The archive sorts the bench's tables; the last bits of their sum are those of the file."""
     protocol = write(tmp_path, SEA.replace('"simulink"', '"platform"'))
-    run_protocol(Request(str(protocol)), tmp_path / "results", workers=1, report=False)
+    run_protocol(Request(str(protocol)), tmp_path / "results", RunOptions(workers=1))
     (path,) = (tmp_path / "results").glob("*.nxs")
     order = list(open_run(path).trials[0].trial.bench["friction"])
     assert order == sorted(order)

@@ -16,9 +16,9 @@ import pytest
 from campaign.archive import RunStatus, open_run
 from campaign.execution.recorder import LATE
 from campaign.link.port import open_port
-from campaign.link.safe import SafeWatch, is_safe, query_frame
+from campaign.link.safe import SafeWatch, is_safe
 from campaign.recording import Outcome
-from campaign.wire.messages import State, Status
+from campaign.wire.messages import Query, State, Status, framed
 from tests.link.controllers import controller
 from tests.system.user import Process, begun, campaign, program_of, write
 
@@ -51,7 +51,7 @@ def status_of(port: str) -> Status:
     line, watch = open_port(port, 2_000_000, exclusive=False), SafeWatch()
     try:
         while watch.last is None:
-            line.write(query_frame())
+            line.write(framed(Query()))
             watch.feed(line.read())
         return watch.last
     finally:

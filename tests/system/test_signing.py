@@ -26,6 +26,7 @@ from campaign.backends import sim
 from campaign.cli.prepare import Request
 from campaign.cli.resume import resume_run
 from campaign.cli.run import run_protocol
+from campaign.cli.run_options import RunOptions
 from campaign.cli.show import show_archive
 from campaign.cli.sign import sign_archive
 from campaign.cli.verify import verify_archives, wanted_signature
@@ -389,7 +390,7 @@ def test_a_key_that_cannot_sign_ends_a_run_before_anything_is_opened(
     results = tmp_path / "results"
     for key, said in ((locked, "passphrase"), (tmp_path / "none", "cannot be read")):
         with pytest.raises(UsageError, match=said) as raised:
-            run_protocol(request, results, workers=1, report=False, yes=True, sign=key)
+            run_protocol(request, results, RunOptions(workers=1, yes=True, sign=key))
         assert raised.value.exit_code is ExitCode.USAGE
     assert calls == []
     assert not results.exists()
@@ -453,7 +454,7 @@ def test_a_run_is_signed_once_it_is_sealed(
 ):
     request = Request(str(write(tmp_path, SEA)))
     results = tmp_path / "results"
-    assert run_protocol(request, results, workers=1, report=False, sign=ada) is ExitCode.DONE
+    assert run_protocol(request, results, RunOptions(workers=1, sign=ada)) is ExitCode.DONE
     (sealed,) = results.glob("*.nxs")
     assert capsys.readouterr().out.splitlines()[-1] == str(sealed)
     assert verify(sealed, "ada@lab", allowed) is ExitCode.DONE
@@ -486,7 +487,7 @@ def test_a_signature_that_fails_at_the_end_costs_the_signature_only(
     monkeypatch.setattr(sim.SimBackend, "make_safe", lambda *arguments: safe)
     request = Request(str(write(tmp_path, SEA)))
     results = tmp_path / "results"
-    assert run_protocol(request, results, workers=1, report=False, sign=ada) is expected
+    assert run_protocol(request, results, RunOptions(workers=1, sign=ada)) is expected
     (sealed,) = results.glob("*.nxs")
     shown = capsys.readouterr()
     assert shown.out.splitlines()[-1] == str(sealed)
@@ -505,7 +506,7 @@ def test_ctrl_c_while_it_is_signed_keeps_the_run_and_says_so(
     monkeypatch.setattr(signing, "sign", interrupt)
     request = Request(str(write(tmp_path, SEA)))
     results = tmp_path / "results"
-    assert run_protocol(request, results, workers=1, report=False, sign=ada) is ExitCode.INTERRUPTED
+    assert run_protocol(request, results, RunOptions(workers=1, sign=ada)) is ExitCode.INTERRUPTED
     shown = capsys.readouterr()
     assert "NOT SIGNED: interrupted" in shown.err
     assert shown.out.splitlines()[-1].endswith(".nxs")
@@ -530,13 +531,12 @@ def test_a_run_that_was_gone_on_with_is_signed_anew_and_its_old_signature_is_no_
         return Ending(Outcome.INTERRUPTED, "stopped")
 
     def resume(key: Path) -> ExitCode:
-        more = {"workers": 1, "report": False, "port": None, "yes": False, "sign": key}
-        return resume_run(str(sealed), results, accept_changes=False, **more)
+        return resume_run(str(sealed), results, RunOptions(workers=1, sign=key))
 
     with monkeypatch.context() as patch:
         patch.setattr(sim.SimBackend, "execute", stop)
         request = Request(str(write(tmp_path, SEA, "sea.toml")))
-        code = run_protocol(request, results, workers=1, report=False, sign=ada)
+        code = run_protocol(request, results, RunOptions(workers=1, sign=ada))
     (sealed,) = results.glob("*.nxs")
     assert code is ExitCode.INTERRUPTED, capsys.readouterr().err
     assert verify(sealed, "ada@lab", allowed) is ExitCode.DONE
@@ -616,7 +616,7 @@ def test_an_ssh_keygen_that_is_of_no_use_is_said_before_anything_is_opened(
     calls = opened(monkeypatch)
     request = Request(str(write(tmp_path, SEA)))
     with pytest.raises(UsageError, match=said):
-        run_protocol(request, tmp_path / "results", workers=1, report=False, yes=True, sign=key)
+        run_protocol(request, tmp_path / "results", RunOptions(workers=1, yes=True, sign=key))
     assert calls == []
     assert not (tmp_path / "results").exists()
 

@@ -24,7 +24,7 @@ def unwritten(monkeypatch: pytest.MonkeyPatch) -> None:
 def typed(
     results: Path, names: Sequence[str], output: Path | None = None, models: Sequence[str] = ()
 ) -> tuple[Path, ExitCode]:
-    return trend_of_archives(names, results, output, "time", models, open_it=False)
+    return trend_of_archives(names, results, output, "time", models)
 
 
 @pytest.mark.slow

@@ -29,16 +29,12 @@ def test_every_message_has_its_row_with_its_fields_in_order() -> None:
         int(kind): kind.name for kind in wire.Kind
     }
     for number, row in documented.items():
-        made = next(t for t, kind in wire_kinds().items() if kind == number)
+        made = wire.MESSAGES[wire.Kind(number)]
         fields = [name for name in made.__dataclass_fields__ if name not in ("items", "channels")]
         places = [re.search(rf"\b{name}\b", row[2]) for name in fields]
         assert all(places), (row, fields)
         starts = [place.start() for place in places if place]
         assert starts == sorted(starts), row
-
-
-def wire_kinds() -> dict[type, wire.Kind]:
-    return {t: k for k, (t, _) in wire.LAYOUTS.items()}
 
 
 @pytest.mark.parametrize("code", wire.NakCode)
@@ -138,7 +134,7 @@ def test_the_worked_examples_are_what_they_say() -> None:
     found = re.findall(pattern, DOCUMENT, re.MULTILINE)
     assert len(found) == len(EXAMPLES)
     for (name, sequence, octets), example in zip(found, EXAMPLES, strict=True):
-        assert name == wire_kinds()[type(example)].name
+        assert name == wire.KINDS[type(example)].name
         [frame] = FrameDecoder().feed(bytes.fromhex(octets))
         assert frame.sequence == int(sequence)
         assert wire.decode(frame.kind, frame.body) == example

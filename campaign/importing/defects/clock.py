@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.importing.defects.defect import Array, counted
+from campaign.importing.defects.defect import Array
+from campaign.text import count
 
 SHORTEST = 10
 """Minimum number of samples of a recording: fewer show no motion."""
@@ -143,7 +144,7 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
     Raises ValueError for times that are no even clock, with the rows and a remedy.
     """
     if rows < 2:
-        raise ValueError(f"{counted(rows, 'row')} hold{'s' if rows == 1 else ''} no recording")
+        raise ValueError(f"{count(rows, 'row')} hold{'s' if rows == 1 else ''} no recording")
     start, last = (float(times(k, k + 1)[0]) for k in (first, first + rows - 1))
     if np.isfinite(last - start) and last > start:
         rate = (rows - 1) / (last - start)

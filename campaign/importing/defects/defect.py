@@ -125,9 +125,3 @@ def correlation(values: Array, part: Array) -> Array:
 def rows_in_words(first: int, last: int) -> str:
     """Row numbers from 1 as text."""
     return f"row {first + 1}" if first == last else f"rows {first + 1} to {last + 1}"
-
-
-def counted(count: int, noun: str) -> str:
-    """`1 sample`, `2 samples`, `2 stretches`."""
-    ending = "es" if noun.endswith("ch") else "s"
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}{ending}"

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from campaign.importing.defects.defect import (
     Array,
     Defect,
-    counted,
     rows_in_words,
     runs,
     usual_step,
 )
+from campaign.text import count
 
 SPANS = (2 * math.pi, 360.0, 1.0, *(float(2**n) for n in range(8, 33)))
 """Scales at which angles wrap around: one turn in the usual units, and powers of 2."""
@@ -53,7 +53,7 @@ def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Def
     lost = np.flatnonzero(~known)
     if len(lost):
         ends = (int(lost[0]), int(lost[-1]))
-        what = f"{name} lacks {counted(len(lost), 'sample')}, the first in row {lost[0] + 1}"
+        what = f"{name} lacks {count(len(lost), 'sample')}, the first in row {lost[0] + 1}"
         yield Defect("lost", (name,), what, ends, float(len(lost)), noted=True)
     if len(values) < 2 or np.ptp(values[known]) == 0:  # a constant channel is no defect
         return
@@ -79,7 +79,7 @@ def _wraparound(name: str, values: Array) -> Iterator[Defect]:
         left = scale - size[jumps]
         if len(jumps) < 0.2 * len(values) and np.all(np.abs(left) <= max(5 * usual, 0.02 * scale)):
             what = (
-                f"{name} begins anew {counted(len(jumps), 'time')} at a scale of {scale:.6g}, "
+                f"{name} begins anew {count(len(jumps), 'time')} at a scale of {scale:.6g}, "
                 f"the first behind row {jumps[0] + 1}"
             )
             where = (int(jumps[0]), int(jumps[-1]) + 1)
@@ -134,7 +134,7 @@ def _spikes(name: str, values: Array) -> Iterator[Defect]:
     rows = np.flatnonzero(is_spike) + 1
     if len(rows):
         what = (
-            f"{name} has {counted(len(rows), 'single sample')} far beyond all others, the first in "
+            f"{name} has {count(len(rows), 'single sample')} far beyond all others, the first in "
             f"row {rows[0] + 1}: {values[rows[0]]:.4g}, where most lie between {low:.4g} and "
             f"{high:.4g}"
         )
@@ -147,8 +147,9 @@ def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Def
     if found:
         first, last = map(int, found[0])
         samples = int(sum(last - first + 1 for first, last in found))
-        more = f" and in {counted(len(found) - 1, 'further stretch')}" if len(found) > 1 else ""
-        where = f"{rows_in_words(first, last)}{more} ({counted(samples, 'sample')})"
+        others = count(len(found) - 1, "further stretch", "further stretches")
+        more = f" and in {others}" if len(found) > 1 else ""
+        where = f"{rows_in_words(first, last)}{more} ({count(samples, 'sample')})"
         what = f"{name} {does} in the middle of motion, {where}"
         yield Defect("dropout", (name,), what, (first, int(found[-1][1])), float(samples))
 

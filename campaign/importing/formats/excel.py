@@ -41,6 +41,10 @@ Cells = Sequence[Any]
 
 def tables(path: Path) -> Sequence[Table]:
     """The tables of a workbook, read in this process."""
+    with path.open("rb") as file:
+        if file.read(len(_OLD)) == _OLD:
+            message = "a workbook of Excel 97 to 2003, or its kin: save it as .xlsx"
+            raise RecordingError.of(path, message)
     _check_size(path)
     with _opened(path) as book, _opened(path, values=False) as formulas:
         result = [
@@ -187,20 +191,15 @@ def _check_formulas(path: Path, dialect: Dialect, sample: Sequence[Cells], formu
                 raise RecordingError([dialect.problem(path, row, message, place=place)])
 
 
-def _tables(path: Path) -> Sequence[Table]:
-    with path.open("rb") as file:
-        if file.read(len(_OLD)) == _OLD:
-            raise RecordingError.of(
-                path, "a workbook of Excel 97 to 2003, or its kin: save it as .xlsx"
-            )
-    return tables_streamed(__name__, path)
-
-
 def _recognises(head: bytes) -> bool:
     parts = b"[Content_Types].xml" in head or b"xl/" in head
     return head.startswith(_OLD) or (head.startswith(b"PK\x03\x04") and parts)
 
 
 FORMAT = RecordingFormat(
-    "excel", "Excel workbook, by openpyxl", (".xlsx", ".xlsm", ".xls"), _recognises, _tables
+    "excel",
+    "Excel workbook, by openpyxl",
+    (".xlsx", ".xlsm", ".xls"),
+    _recognises,
+    partial(tables_streamed, __name__),
 )

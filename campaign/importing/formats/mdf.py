@@ -33,6 +33,10 @@ DENSEST = 1100
 
 def tables(path: Path) -> Sequence[Table]:
     """The groups of a file with more than one sample, read in this process."""
+    with path.open("rb") as raw:
+        if raw.read(len(UNFINISHED)) == UNFINISHED:
+            message = "its recording was never finished: let its program mend it first"
+            raise RecordingError.of(path, message)
     result: list[Table] = []
     with _opened(path) as file:
         for group, each in enumerate(file.groups):
@@ -111,19 +115,10 @@ def _opened(path: Path) -> Iterator[Any]:
             yield file
 
 
-def _tables(path: Path) -> Sequence[Table]:
-    with path.open("rb") as file:
-        if file.read(len(UNFINISHED)) == UNFINISHED:
-            raise RecordingError.of(
-                path, "its recording was never finished: let its program mend it first"
-            )
-    return tables_streamed(__name__, path)
-
-
 FORMAT = RecordingFormat(
     "mdf",
     "MDF 3 and 4, by asammdf",
     (".mf4", ".mdf", ".dat"),
     lambda head: head.startswith((*MAGIC, UNFINISHED)),
-    _tables,
+    partial(tables_streamed, __name__),
 )

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from campaign import channels
 from campaign.channels import UNITS, VOCABULARY, AxisKind
-from campaign.importing.defects.defect import counted
 from campaign.importing.guess.columns import INDEX, TIME, Basis, ColumnGuess, TableGuess
 from campaign.importing.guess.layouts import Layout, PlacedColumn, layouts, slug
 from campaign.importing.guess.relations import ANGLES, RATES, TORQUES
+from campaign.text import count
 from campaign.unit_grammar import parse_unit
 
 _HEAD = Path(__file__).with_name("mapping_head.toml").read_text(encoding="utf-8").rstrip()
@@ -59,7 +59,7 @@ def _recording(layout: Layout, base: Path | None) -> Iterator[str]:
         yield f"table = {_quoted(layout.tables[0].name)}"
     yield f"columns = {_quoted(layout.name)}"
     if starts := max(table.restarts for table in layout.tables):
-        note = f"time begins anew {counted(starts, 'time')}: a trial for each stretch"
+        note = f"time begins anew {count(starts, 'time')}: a trial for each stretch"
         yield _doubt(f"restarts = true  # {note}")
     for table in layout.tables:
         of = f"{table.file.name if layout.joins_files else table.name}: ".lstrip(": ")
