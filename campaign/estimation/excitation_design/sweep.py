@@ -30,15 +30,8 @@ class Chirp:
     duration: float
     law: Law
 
-    def frequency(self, time: Array) -> Array:
-        """At once, at `time` (s), shape (n,) (Hz)."""
-        share = time / self.duration
-        if self.law == "linear":
-            return np.asarray(self.lowest + (self.highest - self.lowest) * share)
-        return np.asarray(self.lowest * (self.highest / self.lowest) ** share)
-
     def phase(self, time: Array) -> Array:
-        """The integral of 2 pi `frequency` from 0, at `time` (s), shape (n,) (rad)."""
+        """Phase (rad) at `time` (s), shape (n,): the integral of 2 pi times the frequency."""
         share = time / self.duration
         if self.law == "linear":
             cycles = (

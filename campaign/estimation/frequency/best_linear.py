@@ -62,14 +62,13 @@ class Excitation:
 
 @dataclass(frozen=True)
 class BestLinear:
-    """Response at the excited lines, with noise, distortion and transient of the output.
+    """Response at the excited lines, with noise and distortion of the output.
 
     Attributes:
         response: its variance over realisations contains noise and stochastic nonlinear part;
             with a single realisation only noise (see `undetermined`).
         noise: variance of the response by noise, shape (n,); NaN for a single period.
         distortion: output at the detection lines; None for a single period.
-        transient: largest share of transient or drift in the output at an excited line.
         undetermined: sentences on what this measurement does not determine, and why.
     """
 
@@ -77,7 +76,6 @@ class BestLinear:
     noise: Array
     distortion: Distortion | None
     excitation: Excitation
-    transient: float
     undetermined: tuple[str, ...]
 
 
@@ -124,16 +122,7 @@ def best_linear(
     distortion = None
     if spectra.noise is not None:
         distortion = detected(spectra, spectra.noise, excited, response.values)
-    level = np.mean(np.abs(spectra.lines[1][:, excited - 1]), axis=0)
-    passing = np.mean(np.abs(spectra.transient[1][:, excited - 1]), axis=0)
-    return BestLinear(
-        response,
-        noise,
-        distortion,
-        described,
-        float(np.max(passing / np.maximum(level, 1e-300))),
-        _undetermined(described),
-    )
+    return BestLinear(response, noise, distortion, described, _undetermined(described))
 
 
 def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array]:

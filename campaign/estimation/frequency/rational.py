@@ -342,8 +342,3 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
     if alike > SURE and excess > 1.0 + SURE * chance:
         return excess, ALIKE_RESIDUALS(correlation=together)
     return excess, NONE
-
-
-def thinned(measured: MeasuredResponse, every: int) -> MeasuredResponse:
-    """Every n-th point, for windows with correlated neighboring lines (Hann: 2)."""
-    return measured.at(slice(None, None, max(every, 1)))

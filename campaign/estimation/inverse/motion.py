@@ -26,8 +26,6 @@ REGRESSION_RATE = 100.0
 """Default rate after decimation (Hz), approximately."""
 FASTER = (2.0, 5.0)
 """Multiples of the slowest rate, below which rows are omitted to see the effect of slow sliding."""
-SHORTEST = 8
-"""Fewest decimated samples of a usable piece of a motion."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class Motion:
     @property
     def sample_rate(self) -> float:
         """Sample rate (Hz)."""
-        return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+        return sample_rate_of(self.time)
 
     def part(self, which: slice) -> Motion:
         """Consecutive samples of the motion."""
@@ -164,8 +162,6 @@ def first_kept(count: int, factor: int) -> int:
 def kept_times(motion: Motion, filtering: FilterSettings) -> Array:
     """Times (s) of the decimated rows of a motion."""
     time = motion.time[filtering.skip :]
-    if filtering.decimation == 1:
-        return time
     return time[first_kept(len(time), filtering.decimation) :: filtering.decimation]
 
 

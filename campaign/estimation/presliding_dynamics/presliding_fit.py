@@ -23,7 +23,6 @@ from campaign.estimation.intervals import (
 from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics, whitened
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
 from campaign.estimation.presliding_dynamics.parameters import LOGARITHMIC
-from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.estimation.presliding_dynamics.shape import SURELY, Misfit, misfit_of
 from campaign.estimation.presliding_dynamics.uncertainty import (
@@ -82,11 +81,6 @@ class PreslidingDynamics:
     spread: Spread
     misfit: Misfit
     reason: Reason
-
-    @property
-    def plant(self) -> Plant:
-        """Plant of the best fit."""
-        return self.fit.plant
 
 
 def identify_presliding_dynamics(
