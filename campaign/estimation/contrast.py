@@ -154,22 +154,19 @@ def left_over(
     sizes = [_by_source(one, 1.0), _by_source(other, abs(factor))]
     parts: list[Systematic] = []
     for source in dict.fromkeys((*sizes[0], *sizes[1])):
-        known = [sum_of(own[source]) for own in sizes if source in own and _known(own[source])]
-        if source in shared and all(source in own for own in sizes):
+        of_source = [own.get(source, []) for own in sizes]
+        stated = [[size for size in each if size is not None] for each in of_source]
+        known = [math.hypot(*each) for each in stated if each]
+        if source in shared and all(of_source):
             left = abs(known[0] - known[1]) if len(known) == 2 else 0.0
             if left:
                 parts.append(Systematic(source, left))
             continue
         if known:
             parts.append(Systematic(source, math.hypot(*known)))
-        if any(None in own.get(source, ()) for own in sizes):
+        if any(None in each for each in of_source):
             parts.append(Systematic(source, None))
     return tuple(parts)
-
-
-def sum_of(sizes: list[float | None]) -> float:
-    """Root of the sum of squares of the known sizes."""
-    return math.hypot(*(size or 0.0 for size in sizes))
 
 
 def ratio_ends(
@@ -232,7 +229,3 @@ def _by_source(estimate: Estimate, size: float) -> dict[str, list[float | None]]
         own = part.standard_uncertainty
         sizes.setdefault(part.source, []).append(None if own is None else size * own)
     return sizes
-
-
-def _known(sizes: list[float | None]) -> bool:
-    return any(size is not None for size in sizes)

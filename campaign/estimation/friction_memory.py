@@ -34,17 +34,11 @@ def memory_angle(time: Array, rate: Array, torque: Array, settled: float) -> flo
     moved = np.abs(np.cumsum(rate[:used]) * step)
     share = torque[:used] / settled
     moved, share = (values.reshape(min(BINS, used), -1).mean(axis=1) for values in (moved, share))
-    places = [_first_above(share, level) for level in LEVELS]
-    if None in places or places[0] == 0:
+    above = [share >= level for level in LEVELS]
+    if above[0][0] or not above[1].any():
         return math.nan
     low, high = (
         float(np.interp(level, share[k - 1 : k + 1], moved[k - 1 : k + 1]))
-        for level, k in zip(LEVELS, places, strict=True)
-        if k is not None
+        for level, k in zip(LEVELS, map(np.argmax, above), strict=True)
     )
     return max(high - low, 0.0) / math.log((1.0 - LEVELS[0]) / (1.0 - LEVELS[1]))
-
-
-def _first_above(values: Array, level: float) -> int | None:
-    found = np.flatnonzero(values >= level)
-    return int(found[0]) if len(found) else None

@@ -81,11 +81,6 @@ class StribeckFit:
     deviation: Array
 
     @property
-    def fitted(self) -> int:
-        """Number of parameters that were fitted, those at a bound included."""
-        return len(self.free)
-
-    @property
     def chi_square(self) -> float:
         """Sum of squared residuals, each over its deviation."""
         return float(np.sum((self.residuals / self.deviation) ** 2))
@@ -103,7 +98,7 @@ class StribeckFit:
         """
         n = len(self.residuals)
         mean_square = max(self.chi_square / n, np.finfo(float).tiny)
-        return n * float(np.log(mean_square)) + self.fitted * float(np.log(n))
+        return n * float(np.log(mean_square)) + len(self.free) * float(np.log(n))
 
     def variance(self, weights: Mapping[str, float]) -> float:
         """Variance of a sum of parameters, each times its weight; what is not free has none."""

@@ -8,7 +8,6 @@ from typing import Any
 from campaign import __version__
 from campaign.axis_kind import axis_terms, axis_unit
 from campaign.errors import CampaignError
-from campaign.estimate import Estimate
 from campaign.identify.compensations import (
     amount,
     identified_compensations,
@@ -49,15 +48,17 @@ def bench_text(found: Identification, command: str) -> str:
         for section in found.sections:
             filled = _going(section, sliding)
             for parameter in filled.values():
-                values[parameter.bench] = _written(parameter.estimate)
-                known[parameter.bench] = known_of(parameter.estimate)
+                estimate = parameter.estimate
+                values[parameter.bench] = amount(estimate.value, estimate.unit)
+                known[parameter.bench] = known_of(estimate)
             correlations += _correlations(section, filled)
             if filled:
                 for path, (value, unit, _) in _settings(section, found.bench).items():
                     if _is_friction(path) and section is not sliding:
                         continue
-                    values[path] = _value(value, unit)
+                    values[path] = value
                     if isinstance(value, float):
+                        values[path] = amount(value, axis_unit(unit))
                         known[path] = {"origin": "assumed"}
     compensations = identified_compensations(found, text)
     values |= compensations.values
@@ -195,16 +196,6 @@ def _without(document: Any, path: str) -> None:
     of_values = document.get("known", {}).get("values", {})
     if path in of_values:
         del of_values[path]
-
-
-def _written(estimate: Estimate) -> Any:
-    return amount(estimate.value, estimate.unit)
-
-
-def _value(value: Any, unit: str) -> Any:
-    if not isinstance(value, float):
-        return value
-    return amount(value, axis_unit(unit))
 
 
 def _correlations(section: Section, filled: Mapping[str, Parameter]) -> Iterator[list[Any]]:

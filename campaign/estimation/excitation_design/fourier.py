@@ -163,12 +163,7 @@ def best_series(
         best[better], scores[better] = tried[better], fresh[better]
     if not np.isfinite(np.min(scores)) or np.min(scores) > 1e6:
         raise ValueError(f"no motion separates {', '.join(terms)}: leave out one of them")
-    return _series(period, best[int(np.argmin(scores))])
-
-
-def _series(period: float, coefficients: Array) -> FourierSeries:
-    half = len(coefficients) // 2
-    sine, cosine = coefficients[:half], coefficients[half:]
+    sine, cosine = np.split(best[int(np.argmin(scores))], 2)
     return FourierSeries(period, tuple(map(float, sine)), tuple(map(float, cosine)))
 
 

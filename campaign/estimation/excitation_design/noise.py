@@ -8,8 +8,6 @@ from campaign.arrays import Array, ComplexArray
 from campaign.estimation.excitation_design.multisines import first_passage
 from campaign.estimation.frequency.multisine import Lines
 
-Spectrum = ComplexArray
-
 
 def band_noise(
     lowest: float, highest: float, duration: float, rate: float, seed: int, order: int = 0
@@ -46,7 +44,7 @@ def band_noise(
     return np.append(noise, noise[0])
 
 
-def _passage(spectrum: Spectrum, lines: Lines, count: int) -> float:
+def _passage(spectrum: ComplexArray, lines: Lines, count: int) -> float:
     """Share of the period at which a signal of these lines passes zero, exactly."""
     whole = np.zeros(count // 2 + 1, dtype=complex)
     whole[lines] = spectrum

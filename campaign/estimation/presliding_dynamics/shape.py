@@ -120,14 +120,14 @@ def misfit_of(plain: JointFit, whitened: JointFit) -> Misfit:
 def _misfit_of(fit: JointFit) -> Misfit:
     size = sum(float(np.sum(answer**2)) for answer in _answers(fit))
     places, columns = _band_columns(fit)
-    _, _, chance, explained = _score_test(fit, columns)
+    _, chance, explained = _score_test(fit, columns)
     left = sum(np.einsum("cn,cnk->k", r, c) for r, c in zip(fit.residuals, columns, strict=True))
     power = sum(np.einsum("cnk,cnk->k", c, c) for c in columns)
     pairs = (left / np.maximum(power, np.finfo(float).tiny)).reshape(-1, 2)
     bands = tuple(Band(place, complex(*pair)) for place, pair in zip(places, pairs, strict=True))
     shapes = _shape_columns(fit)
-    _, shift, shape_chance, shape_explained = _score_test(fit, shapes)
-    alone = [_score_test(fit, [each[:, :, [k]] for each in shapes])[3] for k in range(len(SHAPES))]
+    shift, shape_chance, shape_explained = _score_test(fit, shapes)
+    alone = [_score_test(fit, [each[:, :, [k]] for each in shapes])[2] for k in range(len(SHAPES))]
     return Misfit(
         bands,
         float(np.sqrt(explained / size)),
@@ -223,11 +223,11 @@ def _pushed(fit: JointFit, number: int, force: Array) -> Array:
     return with_torque(fit, number, fit.grids[number].torque - more).answers(number)
 
 
-def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, float, float]:
-    """Step to a model with additional columns: of the columns, of the parameters; its p value; sum
-    of squares explained beyond noise.
+def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, float, float]:
+    """Shift of the parameters in a model with additional columns; p value of these columns; sum of
+    squares that they explain beyond noise.
 
-    columns: of each record, shape (channels, n, k). The step of dependent columns is 0.
+    columns: of each record, shape (channels, n, k). Dependent columns have no effect.
     """
     from scipy.special import chdtrc
 
@@ -241,7 +241,7 @@ def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, floa
     own = square - across.T @ onto
     kept = np.diag(own) > ALIKE * np.maximum(np.diag(square), np.finfo(float).tiny)
     if not np.any(kept):
-        return np.zeros(count), np.zeros(size), 1.0, 0.0
+        return np.zeros(size), 1.0, 0.0
     apart = [
         (more - slopes @ onto)[:, :, kept]
         for slopes, more in zip(fit.jacobians, columns, strict=True)
@@ -266,4 +266,4 @@ def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, floa
     step = np.zeros(count)
     step[kept] = inverse @ total
     explained = float(total @ step[kept]) - NOISE * float(np.trace(inverse @ meat))
-    return step, -onto @ step, float(chdtrc(int(np.sum(kept)), statistic)), max(explained, 0.0)
+    return -onto @ step, float(chdtrc(int(np.sum(kept)), statistic)), max(explained, 0.0)
