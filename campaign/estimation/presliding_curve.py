@@ -49,14 +49,8 @@ def presliding_angle(torque: Array, interfaces: Sequence[Interface]) -> Array:
     # The curve is concave: from below, Newton's steps never pass the solution.
     angle = torque / sum(stiffness for stiffness, _ in interfaces)
     for _ in range(STEPS):
-        # As `presliding_torque` and `presliding_stiffness` have it, in one pass.
-        carried: Array | float = 0.0
-        slope: Array | float = 0.0
-        for stiffness, limit in interfaces:
-            bent = -stiffness * angle / limit
-            carried = carried - limit * np.expm1(bent)
-            slope = slope + stiffness * np.exp(bent)
-        step = (torque - carried) / slope
+        missing = torque - presliding_torque(angle, interfaces)
+        step = missing / presliding_stiffness(angle, interfaces)
         angle = angle + step
         if (np.abs(step) <= 1e-11 * angle).all():
             break

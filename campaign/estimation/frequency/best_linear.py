@@ -17,7 +17,7 @@ from campaign.estimation.frequency.distortion import Distortion, detected
 from campaign.estimation.frequency.line_spectra import LineSpectra, line_spectra
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.multisine import Lines
-from campaign.estimation.frequency.welch import Excited
+from campaign.estimation.frequency.welch import NO_REFERENCE, Excited
 
 FEWEST_REALISATIONS = 7
 """Least number for which their variance is a weight for a fit (Pintelon, Schoukens: 4.3.1)."""
@@ -102,10 +102,7 @@ def best_linear(
     line without input.
     """
     if acts_on == "reference" and reference is None:
-        raise ValueError(
-            "a closed loop without its reference: output over input would be a mixture of the "
-            "plant and its controller; record what comes into the loop from outside"
-        )
+        raise ValueError(NO_REFERENCE)
     signals = [np.atleast_2d(input_), np.atleast_2d(output)]
     if reference is not None:
         signals.append(np.atleast_2d(reference))

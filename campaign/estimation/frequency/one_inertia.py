@@ -59,7 +59,7 @@ def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
         excess=fit.excess,
         criterion=fit.criterion,
         sides=(side,),
-        point=np.concatenate([fit.numerator, fit.denominator, [fit.delay]]),
+        point=fit.vector,
         grounded=False,
         rigid=True,
         function=fit,
@@ -93,7 +93,7 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
         root = max(roots, key=abs)
         return np.array([total / unit, rise / (2.0 * math.pi), -root.real / abs(root)])
 
-    theta = np.concatenate([fit.numerator, fit.denominator, [fit.delay]])
+    theta = fit.vector
     values = told(theta)
     by = gradients(told, theta, np.maximum(1e-5 * np.abs(theta), 1e-12))
     error = propagated(by, fit.scatter)

@@ -106,12 +106,15 @@ class RationalFit:
     highest: float
     condition: float = math.nan
 
+    @property
+    def vector(self) -> Array:
+        """Numerator, denominator and delay, shape (p,)."""
+        return np.concatenate([self.numerator, self.denominator, [self.delay]])
+
     def value(self, frequency: Array) -> ComplexArray:
         """G at `frequency` (Hz), shape (n,)."""
-        s = 1j * np.asarray(frequency, dtype=float) / self.scale
-        delayed = np.exp(-s * (2.0 * np.pi * self.scale * self.delay))
-        over = np.polynomial.polynomial.polyval(s, self.denominator)
-        return np.asarray(delayed * np.polynomial.polynomial.polyval(s, self.numerator) / over)
+        s = np.asarray(1j * np.asarray(frequency, dtype=float) / self.scale)
+        return _model(self.vector, s, len(self.numerator) - 1, self.scale)
 
     def log_jacobian(self, frequency: Array) -> ComplexArray:
         """Derivative of log G by (numerator, denominator, delay), shape (n, p)."""

@@ -107,9 +107,3 @@ def in_blocks(pieces: Sequence[Piece], count: int) -> list[list[slice]]:
 def part(piece: Piece, which: slice) -> Piece:
     """Some rows of a piece."""
     return Piece(piece.columns[which], piece.force[which], piece.time[which])
-
-
-def relative(residuals: Sequence[Array], forces: Sequence[Array]) -> float:
-    """Norm of the residuals over that of the force."""
-    over = sum(float(each @ each) for each in residuals)
-    return float(np.sqrt(over / sum(float(each @ each) for each in forces)))
