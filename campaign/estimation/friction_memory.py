@@ -15,19 +15,19 @@ BINS = 500
 
 
 def memory_angle(time: Array, rate: Array, torque: Array, settled: float) -> float:
-    """Ts / sigma0 (rad): the length over which friction approaches its settled value.
+    """Ts / sigma0 (rad): the displacement over which friction approaches its settled value.
 
-    A load that is moved slowly out of rest displaces bristles before it slides, and friction is
-    F = Fs (1 - c exp(-x / m)) with the load's displacement x (Dahl's model; LuGre's and others' at
-    low rates), wherever it began. So m is the displacement between two levels of F / Fs, over
-    ln((1 - 0.5) / (1 - 0.9)). How soon the drive's torque rises, with which gains, does not matter.
+    A slow load displaces its bristles before it slides. Then friction is F = Fs (1 - c exp(-x / m))
+    with the displacement x of the load (Dahl's model; LuGre's and others at low rates), for any
+    initial state. So m is the displacement between two levels of F / Fs, over
+    ln((1 - 0.5) / (1 - 0.9)). It does not depend on the drive's rise time and gains.
 
     Args:
-        time, rate, torque: of the reversal, from before the load begins to move (s, rad/s, N m), at
-            even intervals, shape (n,).
-        settled: friction torque (N m) of steady sliding behind it, with its sign.
+        time, rate, torque: of the reversal, beginning before the load moves (s, rad/s, N m), evenly
+            spaced, shape (n,).
+        settled: friction torque (N m) of the following steady sliding, signed.
 
-    NaN where the torque begins above the lower level, or does not pass both.
+    NaN where the torque begins above the lower level, or does not pass both levels.
     """
     used = len(time) // BINS * BINS if len(time) > BINS else len(time)
     step = float(np.mean(np.diff(time)))
