@@ -147,7 +147,7 @@ class Residuals:
 
     def forces(self, values: Values) -> list[Array]:
         """Rows of the recorded forces at the delay."""
-        return [each.at(values[self._delay]) for each in self._forces]
+        return [each(values[self._delay]) for each in self._forces]
 
     def modelled(self, values: Values) -> list[Array]:
         """Forces of the model."""
