@@ -177,7 +177,7 @@ def ratio_ends(
     None on a side where no R is excluded. Both None where the interval of `other` includes 0: then
     there is no ratio.
     """
-    if not other.value or not _told_from_zero(other):
+    if not other.value or not excludes_zero(other):
         return None, None
     middle = one.value / other.value
     centre = contrast(one, other, middle, shared)
@@ -209,7 +209,8 @@ def _outward(
     return middle + way * float(brentq(excluded, near, far, xtol=1e-15, rtol=1e-12))
 
 
-def _told_from_zero(estimate: Estimate) -> bool:
+def excludes_zero(estimate: Estimate) -> bool:
+    """Whether the interval, or the bound, of the estimate excludes zero."""
     low, high = estimate.combined
     return (low is not None and low > 0) or (high is not None and high < 0)
 

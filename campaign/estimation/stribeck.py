@@ -16,13 +16,6 @@ from numpy.typing import NDArray
 from campaign.arrays import Array
 from campaign.estimation.least_squares import Minimum, covariance, minimum, refuse_too_few
 
-PARAMETERS = (
-    "viscous_friction",
-    "coulomb_torque",
-    "static_torque",
-    "stribeck_velocity",
-    "stribeck_exponent",
-)
 UNITS = {
     "viscous_friction": "N m s/rad",
     "coulomb_torque": "N m",
@@ -30,6 +23,7 @@ UNITS = {
     "stribeck_velocity": "rad/s",
     "stribeck_exponent": "",
 }
+PARAMETERS = tuple(UNITS)
 SYMBOLS = {
     "viscous_friction": "σ2",
     "coulomb_torque": "Tc",

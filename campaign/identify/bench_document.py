@@ -9,6 +9,7 @@ from campaign import __version__
 from campaign.axis_kind import axis_terms, axis_unit
 from campaign.errors import CampaignError
 from campaign.identify.compensations import (
+    DIRECTIONS,
     amount,
     identified_compensations,
     known_of,
@@ -17,20 +18,12 @@ from campaign.identify.compensations import (
 from campaign.identify.identification import Identification, Section
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
-from campaign.physics.friction import coulomb, friction_models
+from campaign.physics.friction import coulomb, friction_models, stribeck
 from campaign.protocol.bench_edit import with_known
 
 LEAST_CORRELATION = 0.1
 """Correlations below this magnitude are not written."""
 FRICTION = "friction.load."
-CURVE = (
-    "coulomb_torque",
-    "static_torque",
-    "stribeck_velocity",
-    "stribeck_exponent",
-    "viscous_friction",
-)
-"""Keys of a sliding curve; another curve replaces all of them."""
 
 
 def bench_text(found: Identification, command: str) -> str:
@@ -179,7 +172,8 @@ def _stale(values: Mapping[str, Any], bench: Bench) -> list[str]:
     load, model = bench.friction.get("load"), values.get(f"{FRICTION}model")
     if load is None or model is None:
         return []
-    curve = [f"{FRICTION}{direction}{key}" for direction in ("", "negative.") for key in CURVE]
+    # A new curve replaces all keys of the old one.
+    curve = [f"{FRICTION}{side}{key}" for side in DIRECTIONS for key in stribeck.CURVE]
     known = friction_models()[model].options.model_fields
     unknown = [f"{FRICTION}{key}" for key in type(load).model_fields if key not in known]
     return [path for path in (*curve, *unknown) if path not in values]
