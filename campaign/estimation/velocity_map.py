@@ -111,8 +111,8 @@ class DirectionFit:
     Attributes:
         place: what repeats had in common: the commanded speed; without repeats, `speed`.
         speed, torque: positive (rad/s, N m).
-        scatters: how points deviate beyond their windows; by the larger, where they do not tell
-            which.
+        window: deviation of each torque that its window shows (N m, 1 sigma).
+        scatters: how points deviate beyond that; by the larger, where they do not tell which.
         fits: by model.
         lack_of_fit: p-value of `free` against repeated points; None without repeats.
         curve_misfit: of `free`; None if the residuals show none.
@@ -121,6 +121,7 @@ class DirectionFit:
     place: Array
     speed: Array
     torque: Array
+    window: Array
     scatters: tuple[Scatter, ...]
     fits: Mapping[Model, StribeckFit]
     lack_of_fit: float | None = None
@@ -265,7 +266,7 @@ def fit_direction(
     lacking = lack_of_fit(torque, level, part, member, free.residuals, len(level) - len(free.free))
     named = means if repeat_of is None else np.asarray(shared, dtype=float)
     misfit = curve_misfit(means, free.residuals / free.deviation, free.influence * free.deviation)
-    return DirectionFit(named, means, level, scatters, fits, lacking, misfit)
+    return DirectionFit(named, means, level, scatter, scatters, fits, lacking, misfit)
 
 
 def direction_estimates(

@@ -175,14 +175,15 @@ def _shape_columns(fit: JointFit) -> list[Array]:
     """Change of the simulated answer by each of `SHAPES`, in deviations."""
     plant, changes = fit.plant, []
     bristles = plant.bristles[0]
+    # The same force at every amplitude: otherwise larger records would add no information.
+    force = fit.parameters.torque
+    fastest = max(float(np.max(np.abs(fit.motion(n).rate))) for n in range(len(fit.records)))
     for number, group in enumerate(fit.channels):
         motion = fit.motion(number)
         rate, bent = motion.rate, motion.bristle_torque[:, 0]
         base = fit.answers(number)
         speed = float(np.sqrt(np.mean(rate**2)))
         falling = replace(bristles, coulomb_share=0.7, stribeck_velocity=speed)
-        # The same force at every amplitude: otherwise larger records would add no information.
-        force, fastest = fit.parameters.torque, _fastest(fit)
         forces = (bent**3 / force**2, bent**2 / force, rate * np.abs(rate) * force / fastest**2)
         other = [
             fit.answers(number, replace(plant, bristles=each))
@@ -197,10 +198,6 @@ def _shape_columns(fit: JointFit) -> list[Array]:
         kept = [each if np.all(np.isfinite(each)) else np.zeros_like(each) for each in columns]
         changes.append(np.stack(kept, axis=-1))
     return changes
-
-
-def _fastest(fit: JointFit) -> float:
-    return max(float(np.max(np.abs(fit.motion(n).rate))) for n in range(len(fit.records)))
 
 
 def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
