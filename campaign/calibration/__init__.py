@@ -1,1 +1,1 @@
-"""Fitting the unknowns of a bench to published values."""
+"""Fit of a bench's unknowns to published values."""

@@ -148,18 +148,13 @@ def _correlations(outcome: CalibrationOutcome) -> Iterator[list[Any]]:
     fields = [
         (index, path, factor)
         for index, parameter in enumerate(outcome.problem.space.parameters)
-        for path, factor in _determined(outcome, index, parameter)
+        if _ends(outcome, index)
+        for path, factor in parameter.fields
     ]
     for (i, one, first), (j, other, second) in combinations(fields, 2):
         share = float(certainty.correlation[i, j]) * math.copysign(1.0, first * second)
         if math.isfinite(share) and abs(share) >= LEAST_CORRELATION:
             yield [one, other, round(min(1.0, max(-1.0, share)), 3)]
-
-
-def _determined(
-    outcome: CalibrationOutcome, index: int, parameter: Parameter
-) -> tuple[tuple[str, float], ...]:
-    return parameter.fields if _ends(outcome, index) else ()
 
 
 def _as_written(tree: Any, keys: Sequence[str], parameter: Parameter, value: float) -> str:

@@ -101,11 +101,6 @@ class Simulation:
             )
         return evaluation
 
-    def trials(self) -> int:
-        """Count of trials of one evaluation."""
-        present = self._problem.space.present
-        return sum(len(trials) for _, trials in self._planned(present))
-
     def residuals(self, values: Sequence[float]) -> Array:
         """Residual of each target, shape (n,)."""
         return residuals(self._problem.targets, self.evaluate(values).found)

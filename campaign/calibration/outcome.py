@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from campaign.arrays import Array
 from campaign.calibration.leave_out import LeftOut, leave_one_out
@@ -15,7 +15,6 @@ from campaign.estimation.multi_start import Display, Settings, Start, search
 from campaign.estimation.objective import Objective
 from campaign.experiments.interface import Experiment
 from campaign.protocol import Protocol
-from campaign.protocol.calibration import CalibrationOptions
 
 
 @dataclass(frozen=True)
@@ -73,23 +72,28 @@ def calibrate(
 
     Raises UsageError, or ProtocolError, if the tests do not reproduce the cells.
     """
+    options = problem.options
     simulation = Simulation(problem, experiments, workers)
     before = simulation.check()
     objective = Objective(
         problem.space.unknowns,
         simulation.residuals,
         simulation.residuals_of_all,
-        step=problem.options.difference_step,
+        step=options.difference_step,
     )
-    settings = _settings(problem.options)
-    if not fit:
-        settings = replace(settings, starts=0)
+    settings = Settings(
+        starts=options.starts if fit else 0,
+        seed=options.seed,
+        loss=options.loss,
+        tolerance=options.tolerance,
+        max_evaluations=options.max_evaluations,
+    )
     optimum = search(objective, settings, display)
     left: list[LeftOut] = []
     propagation: Propagation | None = None
     interrupted = optimum.interrupted
     try:
-        if fit and leave_out and problem.options.leave_out and not interrupted:
+        if fit and leave_out and options.leave_out and not interrupted:
             left = leave_one_out(problem, simulation, objective, settings, display, optimum.shares)
         if optimum.uncertainty is not None:
             source = propagated or problem.protocol
@@ -121,14 +125,4 @@ def calibrate(
         interrupted=interrupted,
         propagation=propagation,
         was_fitted=fit,
-    )
-
-
-def _settings(options: CalibrationOptions) -> Settings:
-    return Settings(
-        starts=options.starts,
-        seed=options.seed,
-        loss=options.loss,
-        tolerance=options.tolerance,
-        max_evaluations=options.max_evaluations,
     )

@@ -10,7 +10,6 @@ from campaign.calibration.space import Parameter, Space
 from campaign.calibration.targets import (
     DEFAULT_WEIGHT,
     Target,
-    covers,
     make_target,
     weight_of,
 )
@@ -23,6 +22,7 @@ from campaign.protocol.calibration import Calibration, CalibrationOptions, Calib
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, find_faults, shown
 from campaign.protocol.schema import Test
+from campaign.published.patterns import covers
 from campaign.published.values import Cell, Published
 from campaign.text import nearest
 from campaign.units import Quantity, split_quantity
@@ -105,7 +105,7 @@ class _Reader:
         wanted = self._chosen("cells", self._options.cells)
         left_out = self._chosen("without", self._options.without)
         for name in self._options.weights if not self.problems else ():
-            if not any(covers(name, cell) for cell in wanted.values()):
+            if not any(covers(name, path) for path in wanted):
                 message = f"{shown(name)} is none of the calibration's cells"
                 self._report(("weights", name), message, aim_key=True)
         stood_for = {name for test in self._protocol.tests for name in test.entry.reproduces}
@@ -116,7 +116,7 @@ class _Reader:
                 continue
             if cell.table not in stood_for:
                 message = f"no test reproduces {cell.table!r}; add it to a test's 'reproduces'"
-                index = next(i for i, p in enumerate(self._options.cells) if covers(p, cell))
+                index = next(i for i, p in enumerate(self._options.cells) if covers(p, path))
                 self._report(("cells", index), message)
                 continue
             key = weight_of(cell, self._options.weights)
@@ -169,7 +169,7 @@ class _Reader:
                 cell
                 for table in self._published.values()
                 for cell in table.cells
-                if covers(pattern, cell)
+                if covers(pattern, cell.path)
             ]
             if not cells:
                 table = self._published.get(pattern.split("/")[0])

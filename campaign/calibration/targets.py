@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from campaign.arrays import Array
-from campaign.published import patterns
+from campaign.published.patterns import covers
 from campaign.published.values import NO_SIZE, Cell, Published
 from campaign.published.verdicts import CLAIMS
 from campaign.units import convert, split_quantity
@@ -84,11 +84,6 @@ def residuals(targets: Sequence[Target], found: Mapping[str, float]) -> Array:
     return np.array([target.residual(found.get(target.cell.path)) for target in targets])
 
 
-def covers(pattern: str, cell: Cell) -> bool:
-    """Whether `table`, `table/row` or `table/row/column` matches the cell; * is any name."""
-    return patterns.covers(pattern, cell.path)
-
-
 def restricted(published: Published, targets: Sequence[Target]) -> Published:
     """Published tables with the targets as the only cells, for the fit."""
     wanted = {target.cell.path for target in targets}
@@ -102,7 +97,7 @@ def restricted(published: Published, targets: Sequence[Target]) -> Published:
 
 def weight_of(cell: Cell, weights: Mapping[str, str | float]) -> str | None:
     """Most specific name in `weights` that matches the cell; None without a match."""
-    matching = [name for name in weights if covers(name, cell)]
+    matching = [name for name in weights if covers(name, cell.path)]
     return max(matching, key=_closeness, default=None)
 
 

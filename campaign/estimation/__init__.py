@@ -1,1 +1,1 @@
-"""Estimators: what recordings say about friction, with their uncertainty."""
+"""Estimators of friction and motion: pure functions on arrays, with uncertainties."""

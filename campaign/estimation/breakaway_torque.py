@@ -63,13 +63,11 @@ class Breakaway:
     Attributes:
         torque: the largest friction (N m); a bound of "at least" when friction did not fall
             significantly before the recording ended.
-        peak_time: time of the largest friction (s).
-        acceleration: of the load at that time (rad/s^2); the negative derivative of the torque
-            by the inertia (N m per kg m^2).
+        acceleration: of the load at the largest friction (rad/s^2); the negative derivative of the
+            torque by the inertia (N m per kg m^2).
     """
 
     torque: Estimate
-    peak_time: float
     acceleration: float
 
 
@@ -135,7 +133,7 @@ def breakaway_torque(
     peak_time = middle if noisy else peak.peak_time
     wider = fit(peak_time, WIDER * reach).friction(peak_time)
     most = _told(peak, peak_time, end.friction(slid), end.friction(slid - pace), peak_time < slid)
-    return Breakaway(_with_shift(most, wider), peak_time, peak.acceleration(peak_time))
+    return Breakaway(_with_shift(most, wider), peak.acceleration(peak_time))
 
 
 def _told(

@@ -154,22 +154,19 @@ def left_over(
     sizes = [_by_source(one, 1.0), _by_source(other, abs(factor))]
     parts: list[Systematic] = []
     for source in dict.fromkeys((*sizes[0], *sizes[1])):
-        known = [sum_of(own[source]) for own in sizes if source in own and _known(own[source])]
-        if source in shared and all(source in own for own in sizes):
+        of_source = [own.get(source, []) for own in sizes]
+        stated = [[size for size in each if size is not None] for each in of_source]
+        known = [math.hypot(*each) for each in stated if each]
+        if source in shared and all(of_source):
             left = abs(known[0] - known[1]) if len(known) == 2 else 0.0
             if left:
                 parts.append(Systematic(source, left))
             continue
         if known:
             parts.append(Systematic(source, math.hypot(*known)))
-        if any(None in own.get(source, ()) for own in sizes):
+        if any(None in each for each in of_source):
             parts.append(Systematic(source, None))
     return tuple(parts)
-
-
-def sum_of(sizes: list[float | None]) -> float:
-    """Root of the sum of squares of the known sizes."""
-    return math.hypot(*(size or 0.0 for size in sizes))
 
 
 def ratio_ends(
@@ -180,7 +177,7 @@ def ratio_ends(
     None on a side where no R is excluded. Both None where the interval of `other` includes 0: then
     there is no ratio.
     """
-    if not other.value or not _told_from_zero(other):
+    if not other.value or not excludes_zero(other):
         return None, None
     middle = one.value / other.value
     centre = contrast(one, other, middle, shared)
@@ -212,7 +209,8 @@ def _outward(
     return middle + way * float(brentq(excluded, near, far, xtol=1e-15, rtol=1e-12))
 
 
-def _told_from_zero(estimate: Estimate) -> bool:
+def excludes_zero(estimate: Estimate) -> bool:
+    """Whether the interval, or the bound, of the estimate excludes zero."""
     low, high = estimate.combined
     return (low is not None and low > 0) or (high is not None and high < 0)
 
@@ -232,7 +230,3 @@ def _by_source(estimate: Estimate, size: float) -> dict[str, list[float | None]]
         own = part.standard_uncertainty
         sizes.setdefault(part.source, []).append(None if own is None else size * own)
     return sizes
-
-
-def _known(sizes: list[float | None]) -> bool:
-    return any(size is not None for size in sizes)

@@ -10,14 +10,14 @@ import numpy as np
 from campaign.arrays import Array
 
 FALSE_ALARM = 0.01
-"""Chance that noise decides the side of any point of a curve that lies on the level."""
+"""Probability of one or more false decisions for a noisy curve that lies on the level."""
 
 
 @dataclass(frozen=True)
 class LevelCrossing:
-    """A level was passed between the points `before` and `after` (indices).
+    """Crossing of a level between the points `before` and `after` (indices).
 
-    Both lie off it by more than their errors; what is between them may lie on either side.
+    Both differ from the level by more than their errors; points between them may not.
     """
 
     before: int
@@ -26,7 +26,7 @@ class LevelCrossing:
 
 
 def sides(above: Array, error: Array) -> Array:
-    """On which side of zero each point surely lies: 1, -1, or 0 where noise leaves it open.
+    """Side of the level on which each point significantly lies: 1 or -1; 0 if not significant.
 
     Args:
         above: distance of each point from the level, shape (n,).
@@ -39,10 +39,7 @@ def sides(above: Array, error: Array) -> Array:
 
 
 def passings(above: Array, error: Array) -> list[LevelCrossing]:
-    """Every time a curve passes zero; arguments as for `sides`.
-
-    Noise cannot make one: it takes points on both sides that are off by more than their errors.
-    """
+    """Significant crossings of a level by a curve; arguments as for `sides`."""
     side = sides(above, error)
     decided = np.flatnonzero(side)
     return [

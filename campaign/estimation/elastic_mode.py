@@ -52,13 +52,11 @@ class ElasticMode:
         frequency: its resonance (Hz).
         damping_ratio: of that resonance.
         antiresonance: (Hz); below the resonance for a part that hangs on the load.
-        explained: squared residual of a smooth response over that with the mode.
     """
 
     frequency: Estimate
     damping_ratio: Estimate
     antiresonance: Estimate
-    explained: float
 
 
 def elastic_mode(response: Response) -> ElasticMode | None:
@@ -150,7 +148,7 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
     if explained < EVIDENCE or peak < SMALLEST_PEAK or at_bound:
         return None
     drag = float(np.tan(_lead(f, (y - _mode(f, fit.x)).imag)))
-    return _mode_found(fit.x, fit.jac, fit.fun, explained, drag)
+    return _mode_found(fit.x, fit.jac, fit.fun, drag)
 
 
 def _lead(frequency: Array, phase: Array) -> float:
@@ -163,9 +161,7 @@ def _lead(frequency: Array, phase: Array) -> float:
     return float(constant) + np.pi / 2.0
 
 
-def _mode_found(
-    p: Array, jacobian: Array, left: Array, explained: float, drag: float
-) -> ElasticMode | None:
+def _mode_found(p: Array, jacobian: Array, left: Array, drag: float) -> ElasticMode | None:
     """The mode of the parameters `p` of `_mode`, with intervals.
 
     None where the antiresonance does not surely lie below the resonance: of a part that hangs on
@@ -196,7 +192,6 @@ def _mode_found(
         admitted(shifted_by(resonance, "friction", abs((pole - zero) * drag**2))),
         admitted(shifted_by(ratio, "friction", abs(shift * drag))),
         estimate("antiresonance", zero, "Hz", by_zero),
-        explained,
     )
 
 

@@ -31,13 +31,11 @@ OUTSIDE = 0.2
 
 @dataclass(frozen=True)
 class FoundSine:
-    """offset + amplitude * sin(2 pi frequency t + phase); Hz, rad, t from the recording's start."""
+    """amplitude * sin(2 pi frequency t + phase); Hz, rad, t from the recording's start."""
 
     frequency: float
     amplitude: float
     phase: float
-    offset: float
-    explained: float
 
 
 @dataclass(frozen=True)
@@ -56,11 +54,10 @@ class FoundStep:
 
 @dataclass(frozen=True)
 class FoundRamp:
-    """A line of `slope` (1/s) that leaves `level` at time `start` (s)."""
+    """A line of `slope` (1/s) that leaves the first level at time `start` (s)."""
 
     start: float
     slope: float
-    level: float
 
 
 def found_sine(signal: Array, sample_rate: float, frequency: float | None = None) -> FoundSine:
@@ -88,8 +85,7 @@ def found_sine(signal: Array, sample_rate: float, frequency: float | None = None
             f"a sine of {frequency:.4g} Hz explains {100 * max(explained, 0.0):.0f} % of it"
         )
     amplitude = float(np.hypot(fit[0], fit[1]))
-    phase = float(np.arctan2(fit[1], fit[0]))
-    return FoundSine(frequency, amplitude, phase, float(fit[2]), explained)
+    return FoundSine(frequency, amplitude, float(np.arctan2(fit[1], fit[0])))
 
 
 @dataclass(frozen=True)
@@ -281,4 +277,4 @@ def found_ramp(time: Array, signal: Array, until: float) -> FoundRamp:
     line = np.polynomial.Polynomial.fit(time[rising], signal[rising], 1).convert()
     slope = float(line.coef[1])
     start = float((level - line.coef[0]) / slope)
-    return FoundRamp(max(start, float(time[0])), slope, level)
+    return FoundRamp(max(start, float(time[0])), slope)

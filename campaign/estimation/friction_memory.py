@@ -15,36 +15,30 @@ BINS = 500
 
 
 def memory_angle(time: Array, rate: Array, torque: Array, settled: float) -> float:
-    """Ts / sigma0 (rad): the length over which friction approaches its settled value.
+    """Ts / sigma0 (rad): the displacement over which friction approaches its settled value.
 
-    A load that is moved slowly out of rest displaces bristles before it slides, and friction is
-    F = Fs (1 - c exp(-x / m)) with the load's displacement x (Dahl's model; LuGre's and others' at
-    low rates), wherever it began. So m is the displacement between two levels of F / Fs, over
-    ln((1 - 0.5) / (1 - 0.9)). How soon the drive's torque rises, with which gains, does not matter.
+    A slow load displaces its bristles before it slides. Then friction is F = Fs (1 - c exp(-x / m))
+    with the displacement x of the load (Dahl's model; LuGre's and others at low rates), for any
+    initial state. So m is the displacement between two levels of F / Fs, over
+    ln((1 - 0.5) / (1 - 0.9)). It does not depend on the drive's rise time and gains.
 
     Args:
-        time, rate, torque: of the reversal, from before the load begins to move (s, rad/s, N m), at
-            even intervals, shape (n,).
-        settled: friction torque (N m) of steady sliding behind it, with its sign.
+        time, rate, torque: of the reversal, beginning before the load moves (s, rad/s, N m), evenly
+            spaced, shape (n,).
+        settled: friction torque (N m) of the following steady sliding, signed.
 
-    NaN where the torque begins above the lower level, or does not pass both.
+    NaN where the torque begins above the lower level, or does not pass both levels.
     """
     used = len(time) // BINS * BINS if len(time) > BINS else len(time)
     step = float(np.mean(np.diff(time)))
     moved = np.abs(np.cumsum(rate[:used]) * step)
     share = torque[:used] / settled
     moved, share = (values.reshape(min(BINS, used), -1).mean(axis=1) for values in (moved, share))
-    places = [_first_above(share, level) for level in LEVELS]
-    if None in places or places[0] == 0:
+    above = [share >= level for level in LEVELS]
+    if above[0][0] or not above[1].any():
         return math.nan
     low, high = (
         float(np.interp(level, share[k - 1 : k + 1], moved[k - 1 : k + 1]))
-        for level, k in zip(LEVELS, places, strict=True)
-        if k is not None
+        for level, k in zip(LEVELS, map(np.argmax, above), strict=True)
     )
     return max(high - low, 0.0) / math.log((1.0 - LEVELS[0]) / (1.0 - LEVELS[1]))
-
-
-def _first_above(values: Array, level: float) -> int | None:
-    found = np.flatnonzero(values >= level)
-    return int(found[0]) if len(found) else None

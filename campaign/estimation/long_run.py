@@ -1,7 +1,7 @@
 """Covariance of a sum of autocorrelated terms (heteroskedasticity and autocorrelation consistent).
 
 Bartlett's weights (Newey and West, Econometrica 55, 1987). The bandwidth follows Andrews' rule
-(Econometrica 59, 1991, equations 6.2 and 6.4); half and twice of it show how much that decides.
+(Econometrica 59, 1991, equations 6.2 and 6.4); half and twice the bandwidth show its influence.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ import numpy as np
 from campaign.arrays import Array
 
 DIFFER = 1.3
-"""Deviations at half and twice the bandwidth that differ by more than this: the largest counts."""
+"""Ratio of deviations at different bandwidths above which the largest one applies."""
 MOST_LAGS = 0.2
-"""of a piece's terms: a longer bandwidth would leave too few independent parts of it."""
+"""Largest bandwidth over the length of a piece: above it, too few parts are independent."""
 
 
 def long_run(pieces: Sequence[Array], lags: float) -> Array:
-    """Covariance of the sum over independent pieces, each (n, k), by weights up to `lags`, (k, k).
+    """Covariance (k, k) of the sum of terms of independent pieces, (n, k) each, for a bandwidth.
 
-    Terms have mean 0.
+    The terms have mean 0.
     """
-    # Whole numbers of lags are sums over a window; those between two are a mean of theirs.
+    # Weighted mean of the covariances for the two next whole numbers of lags.
     below = max(math.floor(lags), 1)
     above = max(math.ceil(lags), 1)
     share = above * (lags - below) / lags if above > below else 0.0
-    found = (1.0 - share) * _windowed(pieces, below)
-    return found if share == 0.0 else found + share * _windowed(pieces, above)
+    covariance = (1.0 - share) * _windowed(pieces, below)
+    return covariance if share == 0.0 else covariance + share * _windowed(pieces, above)
 
 
 def _windowed(pieces: Sequence[Array], length: int) -> Array:
-    """The same for a whole number: squares of sums over that many terms, at every place."""
+    """As `long_run`, for a whole number of lags: squares of the sums over moving windows."""
     total = np.zeros((pieces[0].shape[1],) * 2)
     for each in pieces:
         sums = np.concatenate([np.zeros((1, each.shape[1])), np.cumsum(each, axis=0)])
@@ -44,7 +44,7 @@ def _windowed(pieces: Sequence[Array], length: int) -> Array:
 
 
 def bandwidth(pieces: Sequence[Array]) -> float:
-    """Lags by Andrews' rule for Bartlett's weights: an AR(1) to each column of pieces (n, k)."""
+    """Bandwidth (lags) by Andrews' rule for Bartlett's weights, with an AR(1) for each column."""
     over, under, count = 0.0, 0.0, sum(len(each) for each in pieces)
     for column in range(pieces[0].shape[1]):
         parts = [each[:, column] for each in pieces]
@@ -61,16 +61,16 @@ def bandwidth(pieces: Sequence[Array]) -> float:
 
 
 def bandwidths(pieces: Sequence[Array]) -> tuple[float, float, float]:
-    """Half, once and twice the bandwidth of the rule, within `MOST_LAGS` of the longest piece."""
+    """Half, once and twice the bandwidth of the rule, at most `MOST_LAGS` of the longest piece."""
     most = MOST_LAGS * max(len(each) for each in pieces)
     lags = min(bandwidth(pieces), most)
     return 0.5 * lags, lags, min(2.0 * lags, most)
 
 
 def safe_deviations(by_bandwidth: Array) -> Array:
-    """Of deviations at half, once and twice the bandwidth, (3, k), those that count, shape (k,).
+    """Deviations to report, shape (k,), from those at half, once and twice the bandwidth, (3, k).
 
-    Those at the rule's own, or the largest where the three differ by more than `DIFFER`.
+    Those at the rule's bandwidth, or the largest where the three differ by more than `DIFFER`.
     """
     largest = np.max(by_bandwidth, axis=0)
     wide = largest > DIFFER * np.min(by_bandwidth, axis=0)
@@ -78,6 +78,6 @@ def safe_deviations(by_bandwidth: Array) -> Array:
 
 
 def scaled_to(covariance: Array, deviation: Array) -> Array:
-    """The covariance (k, k) with these deviations (k,); correlations stay."""
+    """Covariance (k, k) with other deviations (k,) and the same correlations."""
     ratio = deviation / np.sqrt(np.diag(covariance))
     return np.asarray(covariance * np.outer(ratio, ratio))

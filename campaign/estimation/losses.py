@@ -1,6 +1,6 @@
 """Robust losses, as in `scipy.optimize.least_squares`.
 
-Residuals are in standard deviations: at about one the robust losses begin to curb them.
+Residuals are in standard deviations; robust losses reduce the weight of those above about one.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ CURVES: Mapping[str, tuple[Curve, Curve]] = {
 
 
 def cost(loss: Loss, residuals: Array) -> float:
-    """Half the sum of the losses: what a fit makes smallest."""
+    """Half the sum of the losses, which a fit minimizes."""
     return 0.5 * float(np.sum(CURVES[loss][0](residuals**2)))
 
 
 def weights(loss: Loss, residuals: Array) -> Array:
-    """Derivative of each loss by its squared residual, 1 where that counts in full; shape (n,)."""
+    """Derivative of each loss by its squared residual, shape (n,); 1 is full weight."""
     return np.asarray(CURVES[loss][1](residuals**2))

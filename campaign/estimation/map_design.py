@@ -1,17 +1,17 @@
 """Optimal speeds of a velocity map for Equation 4.6 from rough parameters.
 
-A point at speed v adds j jᵀ to the information of the parameters, with j the derivative of the
-torque by each of them over the torque's deviation; their covariance C, the inverse, loses
-C j jᵀ C / (1 + jᵀ C j) (Sherman and Morrison). Points are added one by one, each where it makes the
-product of the parameters' variances smallest, so that no unit and no size counts; Ts and vs, which
-a map is for, count twice. Only roughly is known what a design depends on: the logarithm of that
+A point at speed v adds j jᵀ to the information on the parameters; j is the derivative of the torque
+by each of them, over the torque's deviation. It reduces their covariance C by
+C j jᵀ C / (1 + jᵀ C j) (Sherman and Morrison). Points are added one by one. Each next point
+minimizes the product of the parameters' variances, which is independent of units and sizes. Ts and
+vs, the purpose of a map, count twice. The parameters are known only roughly: the logarithm of the
 product is averaged over several curves (Chaloner and Verdinelli, "Bayesian experimental design",
 Statist. Sci. 10 (1995)).
 
-Beside 40 speeds evenly in their logarithm, 10 such speeds and 30 that are chosen leave 0.77 of the
-standard deviation of Ts and 0.80 of that of vs, as the median over 41 benches; on none of them is
-that of Ts, vs or delta larger, and on 8 that of Tc or sigma2, by up to 7 %: speeds go up to the
-rate limit, far above vs, where a line needs fewer points.
+Compared with 40 speeds, evenly spaced in their logarithm, 10 such speeds and 30 chosen ones reduce
+the standard deviation of Ts to 0.77 and that of vs to 0.80 (medians over 41 benches). On no bench
+is that of Ts, vs or delta larger. On 8 benches that of Tc or sigma2 is larger, by up to 7 %: evenly
+spaced speeds up to the rate limit, far above vs, are more than a line needs.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from campaign.arrays import Array
 from campaign.estimation.stribeck import PARAMETERS, stribeck
 
 COUNTED = {"static_torque": 2.0, "stribeck_velocity": 2.0}
-"""How often the variance of a parameter counts; the others once."""
+"""Weight of a parameter's variance in the product; 1 for other parameters."""
 WIDEST = 2.0
-"""Factor by which vs and delta of the curves differ from what was found, at most."""
+"""Largest factor by which vs and delta of the curves differ from their estimates."""
 ROUNDING = 1e-12
-"""Least share that a logarithm is taken of."""
+"""Least remaining share of a variance, so that its logarithm is finite."""
 RIDGE = 1e-9
-"""of the information, for measured speeds that leave a parameter open."""
+"""Share of the information that is added, for measured speeds that leave a parameter open."""
 
 
 def telling_speeds(
@@ -39,13 +39,13 @@ def telling_speeds(
     """Most informative speeds (rad/s) of further points, ascending; shape (at most `count`,).
 
     Args:
-        curves: parameters of Equation 4.6 by name (SI), any of which may be the true one.
-        measured: speeds (rad/s) that are points of the map already, shape (m,).
-        candidates: speeds (rad/s) to choose among, shape (n,); each is taken once at most, so that
-            the distance between them decides how closely points may lie.
+        curves: parameters of Equation 4.6 by name (SI); each curve may be the true one.
+        measured: speeds (rad/s) of existing points of the map, shape (m,).
+        candidates: speeds (rad/s) to choose from, shape (n,); each is used at most once, so that
+            their spacing is the least distance of points.
 
-    Every torque counts with the same relative deviation: friction that scatters from trial to trial
-    does so in proportion.
+    All torques have the same relative deviation: scatter from trial to trial is proportional to
+    friction.
     """
     weight = np.array([COUNTED.get(name, 1.0) for name in PARAMETERS])
     # One axis each: curve, speed, parameter.
@@ -56,7 +56,7 @@ def telling_speeds(
         moved = np.einsum("cpq,cnq->cnp", covariance, offered)
         whole = 1.0 + np.einsum("cnp,cnp->cn", offered, moved)[:, :, None]
         variance = np.einsum("cpp->cp", covariance)[:, None, :]
-        share = moved**2 / (whole * variance)  # of the variance that goes: below 1 but for rounding
+        share = moved**2 / (whole * variance)  # removed from the variance: below 1 but for rounding
         gain = -np.log1p(-np.minimum(share, 1.0 - ROUNDING)) @ weight
         best = int(np.argmax(np.where(left, gain.mean(axis=0), -np.inf)))
         left[best] = False
@@ -66,7 +66,7 @@ def telling_speeds(
 
 
 def _covariance(rows: Array) -> Array:
-    """Of the parameters, from the sensitivities (n, p) of points that all deviate alike."""
+    """Covariance of the parameters, from sensitivities (n, p) of points with equal deviations."""
     information = rows.T @ rows
     floor = RIDGE * np.diag(information) + np.finfo(float).tiny
     return np.asarray(np.linalg.inv(information + np.diag(floor)))
@@ -75,10 +75,10 @@ def _covariance(rows: Array) -> Array:
 def curves_around(
     values: Mapping[str, float], velocity_error: float, exponent_error: float
 ) -> Iterator[dict[str, float]]:
-    """The curve that was found, and those with vs or delta one relative deviation off.
+    """Estimated curve, and those with vs or delta changed by one relative deviation.
 
-    values: parameters by name (SI). The errors are relative (1 sigma); larger ones than a factor of
-    `WIDEST` count as that.
+    values: parameters by name (SI). The errors are relative (1 sigma), limited to a factor of
+    `WIDEST`.
     """
     yield dict(values)
     for name, error in (

@@ -86,12 +86,11 @@ class Start:
     """Fit from one start.
 
     Attributes:
-        begin, end: shares of the unknowns' ranges, shape (k,).
+        end: shares of the unknowns' ranges, shape (k,).
         cost: at the end.
         reason: why it ended.
     """
 
-    begin: Array
     end: Array
     cost: float
     reason: str
@@ -240,7 +239,7 @@ def fit_from(
         gtol=1e-10,
     )
     reason = "converged" if solution.status > 0 else "stopped after max_evaluations"
-    return Start(begin, solution.x, float(solution.cost) * size**2, reason)
+    return Start(solution.x, float(solution.cost) * size**2, reason)
 
 
 def make_starts(first: Array, count: int, seed: int) -> list[Array]:

@@ -1,6 +1,6 @@
 """A costly residual function over the unit cube, with derivatives and a counter.
 
-What is costly is handed in, e.g. a simulation of trials that is held against what was measured.
+The caller provides it, e.g. as a simulation of trials that is compared with measured data.
 """
 
 from __future__ import annotations
@@ -22,14 +22,13 @@ class Objective:
 
     Attributes:
         unknowns: their bounds span the cube.
-        residuals: of SI values in the order of the unknowns, shape (n,); finite everywhere between
-            the bounds, in standard deviations where a loss other than `linear` is used.
-        residuals_of_all: the same of several sets of values, where that is faster than one by one.
-        derivatives: of the residuals by the values (SI), shape (n, k), where they are known;
-            otherwise they are taken by differences.
-        step: of these differences, as a share of each range; wide enough to bridge the steps that
-            a sampled and quantised loop makes.
-        evaluations: of the residuals so far, those for differences included.
+        residuals: function of SI values in the order of the unknowns, shape (n,); finite everywhere
+            between the bounds, in standard deviations for a loss other than `linear`.
+        residuals_of_all: the same for several sets of values, where that is faster than one by one.
+        derivatives: of the residuals by the values (SI), shape (n, k); None: by differences.
+        step: of these differences, as a share of each range; larger than the steps that sampling
+            and quantization cause in the residuals.
+        evaluations: of the residuals so far, including those for differences.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -42,11 +41,11 @@ class Objective:
 
     @property
     def start(self) -> Array:
-        """The point where the first fit starts."""
+        """Start of the first fit."""
         return shares_of(self.unknowns, [unknown.start for unknown in self.unknowns])
 
     def at(self, shares: Array) -> Array:
-        """Residuals, shape (n,); those of the latest point are remembered."""
+        """Residuals, shape (n,); those of the latest point are cached."""
         key = shares.tobytes()
         if key != self._latest[0]:
             self._latest = (key, self.residuals(values_at(self.unknowns, shares)))
@@ -56,7 +55,7 @@ class Objective:
     def jacobian(self, shares: Array, *, central: bool) -> Array:
         """Derivatives of the residuals by the shares, shape (n, k).
 
-        Differences stay within the bounds: central ones, or to the side with more room.
+        Differences stay within the bounds: central, or one-sided, upward if possible.
         """
         if self.derivatives is not None:
             slopes = [u.slope(float(s)) for u, s in zip(self.unknowns, shares, strict=True)]

@@ -1,8 +1,8 @@
 """Torque over angle below breakaway in closed form, and its inverse.
 
-Where sliding is slow, s(v) is Ts and the bristle equation dz/dq = 1 - sigma0 z / Ts has a closed
-form: T = Tb (1 - exp(-sigma0 q / Tb)). Interfaces in parallel add such curves; each slips at its
-own torque, and the slope falls step by step.
+For slow sliding, s(v) is Ts and the bristle equation dz/dq = 1 - sigma0 z / Ts has a closed form:
+T = Tb (1 - exp(-sigma0 q / Tb)). The curves of parallel interfaces add. Each interface slips at its
+own torque, so that the slope decreases in steps.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from campaign.arrays import Array
 
 STEPS = 100
-"""Newton steps at most; a handful is the rule."""
+"""Most Newton steps; usually about five."""
 
 
 class Interface(NamedTuple):
-    """One interface that sticks: stiffness at the start (N m/rad), torque at which it slips."""
+    """One sticking interface: initial stiffness (N m/rad), slip torque (N m)."""
 
     stiffness: float
     torque: float
@@ -42,21 +42,15 @@ def presliding_stiffness(angle: Array, interfaces: Sequence[Interface]) -> Array
 
 
 def presliding_angle(torque: Array, interfaces: Sequence[Interface]) -> Array:
-    """The angle (rad) at torques from 0 to below the sum of the limits, shape (n,)."""
+    """Angle (rad) at torques from 0 to below the sum of the slip torques, shape (n,)."""
     if len(interfaces) == 1:
         ((stiffness, limit),) = interfaces
         return np.asarray(-limit / stiffness * np.log1p(-torque / limit))
-    # The curve is concave: from below, Newton's steps never pass the solution.
+    # The curve is concave: from below, Newton's steps never exceed the solution.
     angle = torque / sum(stiffness for stiffness, _ in interfaces)
     for _ in range(STEPS):
-        # As `presliding_torque` and `presliding_stiffness` have it, in one pass.
-        carried: Array | float = 0.0
-        slope: Array | float = 0.0
-        for stiffness, limit in interfaces:
-            bent = -stiffness * angle / limit
-            carried = carried - limit * np.expm1(bent)
-            slope = slope + stiffness * np.exp(bent)
-        step = (torque - carried) / slope
+        missing = torque - presliding_torque(angle, interfaces)
+        step = missing / presliding_stiffness(angle, interfaces)
         angle = angle + step
         if (np.abs(step) <= 1e-11 * angle).all():
             break
@@ -64,9 +58,9 @@ def presliding_angle(torque: Array, interfaces: Sequence[Interface]) -> Array:
 
 
 def angle_derivatives(angle: Array, interfaces: Sequence[Interface]) -> Array:
-    """How the angle at a torque changes with each stiffness and limit, shape (n, 2 interfaces).
+    """Derivatives of the angle at a torque by the parameters, shape (n, 2 interfaces).
 
-    Columns: stiffness of the first interface, its limit, stiffness of the second ... By the
+    Columns: stiffness of the first interface, its slip torque, stiffness of the second ... By the
     implicit function theorem: dq/dp = -(dT/dp) / (dT/dq).
     """
     columns = []

@@ -149,8 +149,3 @@ def shifted(name: str, estimate: Estimate, by: float) -> Estimate:
     """Estimate plus an exact number, under another name."""
     low, high = (None if end is None else end + by for end in (estimate.low, estimate.high))
     return replace(estimate, name=name, value=estimate.value + by, low=low, high=high)
-
-
-def named(estimate: Estimate, name: str) -> Estimate:
-    """The same estimate under another name."""
-    return replace(estimate, name=name)

@@ -126,6 +126,10 @@ def _log_gain(z: ComplexArray) -> Array:
     return np.asarray(z.real)
 
 
+def _phase(z: ComplexArray) -> Array:
+    return np.asarray(z.imag)
+
+
 def _minus_3_db(seen: Response, loop: Response) -> list[Crossing]:
     """Falling crossings of -3 dB by T, by frequency."""
     above = np.log(np.abs(seen.values) / MINUS_3_DB)
@@ -154,11 +158,7 @@ def _gain_crossovers(loop: Response) -> list[Crossing]:
     """Crossings of 0 dB by L, each with its phase margin, by frequency."""
     above, turns, crossings = np.log(np.abs(loop.values)), None, []
     for passing in passings(above, loop.relative_error):
-
-        def phase(z: ComplexArray) -> Array:
-            return np.asarray(z.imag)
-
-        reading = _read(loop.frequency, loop, passing, _log_gain, phase)
+        reading = _read(loop.frequency, loop, passing, _log_gain, _phase)
         if reading is None:
             continue
         if turns is None:  # the phase of the first one is between -270 and 90 deg

@@ -1,4 +1,4 @@
-"""Amplitude of a signal at one frequency, with the scatter of its cycles."""
+"""Amplitude of a signal at one frequency, with an interval from the scatter of its cycles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from campaign.estimation.intervals import with_error
 from campaign.reason import Cause
 
 LEAST_SAMPLES = 4
-"""in a cycle, to tell sine, cosine and mean with something left over."""
+"""Fewest samples in a cycle: one more than sine, cosine and mean."""
 TOO_FEW_CYCLES = Cause(
     "too few cycles", "its cycles are too few, or too short, to show how they scatter"
 )
@@ -21,8 +21,8 @@ TOO_FEW_CYCLES = Cause(
 def amplitude(name: str, time: Array, samples: Array, frequency: float, unit: str) -> Estimate:
     """Amplitude at `frequency` (Hz) by least squares with a mean; t over whole cycles.
 
-    Each cycle is fitted by itself; what they scatter in phase with the whole is the error of their
-    mean. `time` (s) and `samples` have shape (n,), evenly spaced.
+    Each cycle is also fitted separately. The scatter of the parts in phase with the whole
+    determines the error. `time` (s) and `samples` have shape (n,), evenly spaced.
     """
     whole = _phasor(time, samples, frequency)
     value = abs(whole)

@@ -1,4 +1,4 @@
-"""The response to one sine: fundamental of output over input by least squares, with its error."""
+"""Response to one sine: fundamental of output over input by least squares, with its error."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class SinePoint:
     Attributes:
         frequency: of the excitation (Hz).
         response: output over input at that frequency, complex.
-        error: standard deviation of the real and of the imaginary part of `response`, from what is
-            left in both signals after offset, drift, fundamental and harmonics.
-        coherence: share of the output's power, drift apart, that is at the excitation frequency: 1
-            for a linear system without noise.
+        error: standard deviation of the real and of the imaginary part of `response`, from the
+            residuals of both signals without offset, drift, fundamental and harmonics.
+        coherence: share of the excitation frequency in the output's power, without drift; 1 for a
+            linear system without noise.
     """
 
     frequency: float
@@ -37,13 +37,13 @@ class SinePoint:
 def sine_point(time: Array, input_: Array, output: Array, frequency: float) -> SinePoint:
     """Response at `frequency` (Hz) of signals sampled at `time` (s), all of shape (n,).
 
-    What is left is taken for white. Where it is more than noise (a mode that still rings, harmonics
-    above the ninth), the error is too large rather than too small: on the bench `platform` it is
-    right above 80 Hz and up to ten times the scatter of repeated trials near the mode at 11 Hz.
-    The scatter from cycle to cycle would be five times too small below 6 Hz, where friction
-    differs from trial to trial.
+    The residuals count as white noise. If they are more than noise (a mode that still rings,
+    harmonics above the ninth), the error is too large rather than too small: on the bench
+    `platform` it is right above 80 Hz, and up to ten times the scatter of repeated trials near the
+    mode at 11 Hz. Below 6 Hz, where friction differs from trial to trial, the scatter from cycle to
+    cycle would be five times too small.
 
-    Raises ValueError when there are too few samples, or no input at that frequency.
+    Raises ValueError for too few samples, or no input at that frequency.
     """
     if len(time) < 8 or np.ptp(time) * frequency < 0.9:
         raise ValueError(f"less than one cycle of {frequency:.4g} Hz was recorded")
@@ -56,15 +56,15 @@ def sine_point(time: Array, input_: Array, output: Array, frequency: float) -> S
     waves = [wave(k * angle) for k in orders for wave in (np.cos, np.sin)]
     basis = np.column_stack([np.ones_like(angle), angle / angle[-1] - 0.5, *waves])
     signals = np.column_stack([input_, output])
-    found, *_ = np.linalg.lstsq(basis, signals, rcond=None)
-    amplitude = found[2] - 1j * found[3]
+    fit, *_ = np.linalg.lstsq(basis, signals, rcond=None)
+    amplitude = fit[2] - 1j * fit[3]
     if not abs(amplitude[0]) > 0:
         raise ValueError(f"the input has no part at {frequency:.4g} Hz")
     freedom = max(len(time) - basis.shape[1], 1)
-    noise = np.sum((signals - basis @ found) ** 2, axis=0) / freedom
+    noise = np.sum((signals - basis @ fit) ** 2, axis=0) / freedom
     response = complex(amplitude[1] / amplitude[0])
     variance = (noise[1] + abs(response) ** 2 * noise[0]) * 2.0 / len(time)
-    moving = output - basis[:, :2] @ found[:2, 1]
+    moving = output - basis[:, :2] @ fit[:2, 1]
     power = float(np.mean(moving**2))
     share = 0.5 * abs(amplitude[1]) ** 2 / power if power > 0 else 0.0
     error = float(np.sqrt(variance) / abs(amplitude[0]))
@@ -74,7 +74,7 @@ def sine_point(time: Array, input_: Array, output: Array, frequency: float) -> S
 def mean_point(points: Sequence[SinePoint]) -> SinePoint:
     """Mean of repetitions at one frequency.
 
-    For three or more, its error is from their scatter, unless their own errors are larger. The
+    The error of three or more is from their scatter, unless their own errors are larger. The
     scatter is widened by Student's t over the normal quantile, because intervals use the latter:
     three complex numbers have four degrees of freedom and a factor of 1.4.
     """

@@ -62,9 +62,9 @@ def over_cycles(samples: Array, per_cycle: float) -> Estimate:
         per_cycle: samples in one cycle of the motion; need not be an integer.
     """
     whole = whole_cycles(len(samples), per_cycle)
-    used = samples[: round(whole * per_cycle)] if whole else samples
     if not whole:
-        return _without(used, NAME, UNIT, SHORT())
+        return _without(samples, NAME, UNIT, SHORT())
+    used = samples[: round(whole * per_cycle)]
     edges = np.round(np.linspace(0, len(used), 2 * whole + 1)).astype(int)
     return _of_parts(used, edges, NAME, UNIT, "half cycles")
 

@@ -16,13 +16,6 @@ from numpy.typing import NDArray
 from campaign.arrays import Array
 from campaign.estimation.least_squares import Minimum, covariance, minimum, refuse_too_few
 
-PARAMETERS = (
-    "viscous_friction",
-    "coulomb_torque",
-    "static_torque",
-    "stribeck_velocity",
-    "stribeck_exponent",
-)
 UNITS = {
     "viscous_friction": "N m s/rad",
     "coulomb_torque": "N m",
@@ -30,6 +23,7 @@ UNITS = {
     "stribeck_velocity": "rad/s",
     "stribeck_exponent": "",
 }
+PARAMETERS = tuple(UNITS)
 SYMBOLS = {
     "viscous_friction": "σ2",
     "coulomb_torque": "Tc",
@@ -81,11 +75,6 @@ class StribeckFit:
     deviation: Array
 
     @property
-    def fitted(self) -> int:
-        """Number of parameters that were fitted, those at a bound included."""
-        return len(self.free)
-
-    @property
     def chi_square(self) -> float:
         """Sum of squared residuals, each over its deviation."""
         return float(np.sum((self.residuals / self.deviation) ** 2))
@@ -103,7 +92,7 @@ class StribeckFit:
         """
         n = len(self.residuals)
         mean_square = max(self.chi_square / n, np.finfo(float).tiny)
-        return n * float(np.log(mean_square)) + self.fitted * float(np.log(n))
+        return n * float(np.log(mean_square)) + len(self.free) * float(np.log(n))
 
     def variance(self, weights: Mapping[str, float]) -> float:
         """Variance of a sum of parameters, each times its weight; what is not free has none."""

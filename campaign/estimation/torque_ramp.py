@@ -9,22 +9,22 @@ import numpy as np
 from campaign.arrays import Array, Flags
 
 BINS = 250
-"""of a ramp: each shows a small part of the curve, and knows little of its neighbour's noise."""
+"""Number of bins of a ramp: a small part of the curve each, with almost independent noise."""
 LONGEST_BIN = 0.1
-"""s; a slow ramp has more bins than BINS."""
+"""Longest bin (s): a slow ramp has more than `BINS`."""
 FEWEST_BINS = 20
 """Fewest bins of a ramp for a curve and its errors."""
 
 
 @dataclass(frozen=True)
 class Ramp:
-    """A torque ramp to the positive side, in bins.
+    """A positive torque ramp in bins.
 
     Attributes:
         edges: of the bins (s), shape (n + 1,).
-        torque: drive torque at the edges (N m), on a straight line, 0 before it; shape (n + 1,).
+        torque: drive torque at the edges (N m): 0 before the ramp, then linear; shape (n + 1,).
         rate: mean gyro rate of each bin (rad/s), shape (n,).
-        resting: how many bins lie before the ramp.
+        resting: number of bins before the ramp.
         slope: of the torque (N m/s).
     """
 
@@ -36,14 +36,14 @@ class Ramp:
 
     @property
     def typical_rate(self) -> float:
-        """Rate in the later half of the ramp beyond that at rest (rad/s), where a fit may start."""
+        """Median rate of the later half of the ramp less that at rest (rad/s), to start a fit."""
         bias = float(np.mean(self.rate[: self.resting])) if self.resting else 0.0
         moving = self.rate[self.resting :]
         least = 1e-3 * float(np.std(self.rate)) + float(np.finfo(float).tiny)
         return max(float(np.median(moving[len(moving) // 2 :])) - bias, least)
 
     def until(self, torque: float) -> Ramp:
-        """The part of it up to a torque (N m)."""
+        """Part of the ramp up to a torque (N m)."""
         count = int(np.searchsorted(self.torque, torque, side="right")) - 1
         return replace(
             self,
@@ -53,7 +53,7 @@ class Ramp:
         )
 
     def used(self, first: float) -> Flags:
-        """Which bins are fitted, shape (n,): those at rest, and those from `first` (N m) on."""
+        """Mask of the fitted bins, shape (n,): those at rest, and those from `first` (N m) on."""
         used: Flags = self.torque[:-1] >= first
         used[: self.resting] = True
         return used
@@ -62,13 +62,13 @@ class Ramp:
 def ramp_of(time: Array, rate: Array, torque: Array, start: float, top: float) -> Ramp:
     """Bins of a recorded ramp that begins at `start` (s), up to a torque of `top` (N m).
 
-    time (s), rate (rad/s) and torque (N m) have shape (n,), are evenly sampled, and go to the
-    positive side. Raises ValueError for too few samples, and when the torque does not rise.
+    time (s), rate (rad/s) and torque (N m) have shape (n,), are evenly sampled, and positive.
+    Raises ValueError for too few samples, and for a torque that does not rise.
     """
     interval = float(np.ptp(time)) / max(len(time) - 1, 1)
     begin = int(np.searchsorted(time, start - 0.5 * interval))
     length = np.arange(1, len(time) - begin + 1)
-    # The mean of a ramp is half of its end: that finds the end, however noisy the torque is.
+    # The mean of a ramp is half of its last value: this determines the end despite noise.
     end = begin + int(np.searchsorted(np.cumsum(torque[begin:]) / length, 0.5 * top))
     end = min(end, len(time))
     if end - begin < FEWEST_BINS:

@@ -1,7 +1,7 @@
 """Bounded unknowns, and the unit cube of a fit.
 
-A point of the cube has one share for each unknown: 0 at its lower bound, 1 at its upper one. So all
-unknowns are of like size, and a step, a bound and an interval mean the same for each.
+A point of the cube has one share for each unknown: 0 at its lower bound, 1 at its upper bound. So
+all unknowns have the same scale, and steps, bounds and intervals are comparable.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ class Unknown:
     """A number to be fitted.
 
     Attributes:
-        lower, upper: its bounds, SI; the lower one above zero where it is logarithmic.
-        start: where the first fit starts, between them.
-        logarithmic: whether shares are even in its logarithm, or in itself.
+        lower, upper: bounds, SI; a logarithmic unknown has a positive lower bound.
+        start: start value of the first fit, within the bounds.
+        logarithmic: whether the share is linear in the logarithm of the value.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Unknown:
             raise ValueError(f"{self.name}: {self.start:g} is not between its bounds")
 
     def value(self, share: float) -> float:
-        """SI value at a share of the way from lower (0) to upper (1); beyond them, too."""
+        """SI value at a share of the range; shares outside of 0 to 1 are allowed."""
         if self.logarithmic:
             return self.lower * math.exp(share * math.log(self.upper / self.lower))
         return self.lower + share * (self.upper - self.lower)

@@ -180,8 +180,15 @@ class DirectionFit:
 
     def beyond(self, name: str) -> Reason:
         """Why a parameter is extrapolated; none where it is not, or no Stribeck effect shows."""
+        if not self.shows_stribeck_effect:
+            return NONE
         velocity = self.fits["free"].values["stribeck_velocity"]
-        return extrapolated(name, self.speed, velocity) if self.shows_stribeck_effect else NONE
+        below = int(np.sum(self.speed < velocity))
+        if name == "static_torque" and below < FEWEST_BELOW:
+            return EXTRAPOLATED(symbol="Ts", why=FEW_BELOW(counted=_speeds(below), speeds=below))
+        if name == "coulomb_torque" and not np.any(self.speed > FAR * velocity):
+            return EXTRAPOLATED(symbol="Tc", why=NONE_ABOVE(times=FAR))
+        return NONE
 
     def form_part(self, model: Model, name: str) -> float:
         """What the form of the curve leaves open of a parameter (1 sigma, in its unit).
@@ -210,19 +217,6 @@ class DirectionFit:
         needed = math.exp(BRANCH * misfit.length) * self.fits[model].values["stribeck_velocity"]
         near = name in ("coulomb_torque", "viscous_friction") and self.speed.max() < needed
         return MISFIT_ABOVE(times=math.exp(BRANCH * misfit.length)) if near else NONE
-
-
-def extrapolated(parameter: str, speed: Array, velocity: float) -> Reason:
-    """Why a parameter is extrapolated; none where it is not.
-
-    speed: of the points (rad/s), shape (n,); velocity: the Stribeck velocity (rad/s).
-    """
-    below = int(np.sum(speed < velocity))
-    if parameter == "static_torque" and below < FEWEST_BELOW:
-        return EXTRAPOLATED(symbol="Ts", why=FEW_BELOW(counted=_speeds(below), speeds=below))
-    if parameter == "coulomb_torque" and not np.any(speed > FAR * velocity):
-        return EXTRAPOLATED(symbol="Tc", why=NONE_ABOVE(times=FAR))
-    return NONE
 
 
 def _speeds(count: int) -> str:
@@ -316,15 +310,16 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
             name, value, unit, reason=HELD_EXPONENT(value=HELD[model]), origin=Origin.GIVEN
         )
     ended = found.bounds.get("stribeck_exponent")
+    plain = Estimate(name, value, unit, method=method)
     if ended and name in _moved_by_exponent(fit):
         reason = EXPONENT_ENDED(value=found.values["stribeck_exponent"], side=ended)
-        return refused(Estimate(name, value, unit, method=method), reason)
+        return refused(plain, reason)
     if reason := fit.misfit_above(model, name):
-        return refused(Estimate(name, value, unit, method=method), reason)
+        return refused(plain, reason)
     if name in found.bounds:
-        return _at_bound(fit, model, name, method)
+        return _at_bound(fit, model, plain)
     if name in found.open:
-        return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
+        return refused(plain, LEFT_OPEN())
     error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
     told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
     if is_bent(fit, model, name):
@@ -371,19 +366,16 @@ def _by_profile(fit: DirectionFit, model: Model, told: Estimate) -> Estimate:
     return replace(told, low=low, high=high, method=method)
 
 
-def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estimate:
+def _at_bound(fit: DirectionFit, model: Model, plain: Estimate) -> Estimate:
     """A friction that would be negative: one-sided, by profile; a search that ended: open."""
-    found = fit.fits[model]
-    value, unit = found.values[name], UNITS[name]
+    found, name, value = fit.fits[model], plain.name, plain.value
     physical = name in ("viscous_friction", "coulomb_torque", "static_torque")
     if not physical or model == "none":
         ended = SEARCH_ENDED(value=value, side=found.bounds[name])
-        reason = NEGATIVE() if physical else ended
-        return refused(Estimate(name, value, unit, method=method), reason)
-    exponent = HELD[model]
+        return refused(plain, NEGATIVE() if physical else ended)
 
     def cost(tried: float) -> float:
-        return held_at(found, fit.speed, fit.torque, name, tried, exponent)
+        return held_at(found, fit.speed, fit.torque, name, tried, HELD[model])
 
     # Profile likelihood on one side: the rise of chi-square is the square of Student's t there; of
     # the two-sided one, because the data choose whether there are one side or two.
@@ -394,18 +386,14 @@ def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estima
     try:
         high = profile_limit(cost, value, step, rise)
     except ValueError:
-        told = Estimate(name, value, unit, method=method)
-        return refused(told, LEFT_OPEN())
+        return refused(plain, LEFT_OPEN())
     if name != "viscous_friction" and high > USELESS * float(fit.torque.max()):
         # A map that ends below vs is as well described by Tc = 0 and a huge viscous friction as by
         # the truth. Where noise prefers that, a limit would be of the wrong one of two minima: it
         # held Tc in 22 % of such maps.
-        told = Estimate(name, value, unit, method=method)
-        return refused(told, LIKE_VISCOUS())
-    told = Estimate(
-        name,
-        value,
-        unit,
+        return refused(plain, LIKE_VISCOUS())
+    told = replace(
+        plain,
         high=high,
         level=0.95,
         method=f"at its bound; one-sided by profile likelihood, t({fit.freedom})",

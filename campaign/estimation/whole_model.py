@@ -30,11 +30,10 @@ from campaign.estimation.multi_start import (
     no_display,
     search,
 )
-from campaign.estimation.objective import Objective
+from campaign.estimation.objective import Objective, Values
 from campaign.estimation.unknowns import Unknown, values_at
 from campaign.reason import Cause
 
-Values = tuple[float, ...]
 Residuals = Callable[[Values], Sequence[Array]]
 METHOD = "least squares through the simulation; deviation with autocorrelation (Newey and West)"
 NULL = 1e-6

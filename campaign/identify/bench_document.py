@@ -8,8 +8,8 @@ from typing import Any
 from campaign import __version__
 from campaign.axis_kind import axis_terms, axis_unit
 from campaign.errors import CampaignError
-from campaign.estimate import Estimate
 from campaign.identify.compensations import (
+    DIRECTIONS,
     amount,
     identified_compensations,
     known_of,
@@ -18,20 +18,12 @@ from campaign.identify.compensations import (
 from campaign.identify.identification import Identification, Section
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
-from campaign.physics.friction import coulomb, friction_models
+from campaign.physics.friction import coulomb, friction_models, stribeck
 from campaign.protocol.bench_edit import with_known
 
 LEAST_CORRELATION = 0.1
 """Correlations below this magnitude are not written."""
 FRICTION = "friction.load."
-CURVE = (
-    "coulomb_torque",
-    "static_torque",
-    "stribeck_velocity",
-    "stribeck_exponent",
-    "viscous_friction",
-)
-"""Keys of a sliding curve; another curve replaces all of them."""
 
 
 def bench_text(found: Identification, command: str) -> str:
@@ -49,15 +41,17 @@ def bench_text(found: Identification, command: str) -> str:
         for section in found.sections:
             filled = _going(section, sliding)
             for parameter in filled.values():
-                values[parameter.bench] = _written(parameter.estimate)
-                known[parameter.bench] = known_of(parameter.estimate)
+                estimate = parameter.estimate
+                values[parameter.bench] = amount(estimate.value, estimate.unit)
+                known[parameter.bench] = known_of(estimate)
             correlations += _correlations(section, filled)
             if filled:
                 for path, (value, unit, _) in _settings(section, found.bench).items():
                     if _is_friction(path) and section is not sliding:
                         continue
-                    values[path] = _value(value, unit)
+                    values[path] = value
                     if isinstance(value, float):
+                        values[path] = amount(value, axis_unit(unit))
                         known[path] = {"origin": "assumed"}
     compensations = identified_compensations(found, text)
     values |= compensations.values
@@ -178,7 +172,8 @@ def _stale(values: Mapping[str, Any], bench: Bench) -> list[str]:
     load, model = bench.friction.get("load"), values.get(f"{FRICTION}model")
     if load is None or model is None:
         return []
-    curve = [f"{FRICTION}{direction}{key}" for direction in ("", "negative.") for key in CURVE]
+    # A new curve replaces all keys of the old one.
+    curve = [f"{FRICTION}{side}{key}" for side in DIRECTIONS for key in stribeck.CURVE]
     known = friction_models()[model].options.model_fields
     unknown = [f"{FRICTION}{key}" for key in type(load).model_fields if key not in known]
     return [path for path in (*curve, *unknown) if path not in values]
@@ -195,16 +190,6 @@ def _without(document: Any, path: str) -> None:
     of_values = document.get("known", {}).get("values", {})
     if path in of_values:
         del of_values[path]
-
-
-def _written(estimate: Estimate) -> Any:
-    return amount(estimate.value, estimate.unit)
-
-
-def _value(value: Any, unit: str) -> Any:
-    if not isinstance(value, float):
-        return value
-    return amount(value, axis_unit(unit))
 
 
 def _correlations(section: Section, filled: Mapping[str, Parameter]) -> Iterator[list[Any]]:

@@ -51,11 +51,6 @@ class Entries:
     values: dict[str, Any] = field(default_factory=dict)
     known: dict[str, Any] = field(default_factory=dict)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the compensations."""
-        return tuple(dict.fromkeys(path.split(".")[1] for path in self.values))
-
 
 @dataclass(frozen=True)
 class Bristles:

@@ -10,7 +10,7 @@ from typing import Any
 from campaign.axis_kind import axis_terms
 from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Origin
 from campaign.estimation.gate import TOO_WIDE
 from campaign.experiments.analysis import result_of, suitable
 from campaign.experiments.interface import (
@@ -304,7 +304,8 @@ def _compared(
         JudgedNumber.of(
             each.estimate,
             after[each.estimate.name],
-            shared=_shared(each.estimate),
+            # The systematic parts that both runs of one rig share.
+            shared=[part.source for part in each.estimate.systematic if part.of_rig],
             quantity=each.estimate.name,
             conditions={},
         )
@@ -312,11 +313,6 @@ def _compared(
         if each.estimate.name in after
     )
     return replace(section, changes=tuple(changes))
-
-
-def _shared(estimate: Estimate) -> list[str]:
-    """Sources of systematic parts that both runs of one rig share."""
-    return [part.source for part in estimate.systematic if part.of_rig]
 
 
 def _judged(sections: Sequence[Section]) -> Iterator[Section]:

@@ -33,10 +33,6 @@ class ChosenRun:
         """`RUN` or `RUN:TEST`."""
         return f"{self.run.name}:{self.test}" if self.test else self.run.name
 
-    def of_bench(self, bench: str) -> tuple[ArchivedTrial, ...]:
-        """Trials on the bench of that name."""
-        return tuple(t for t in self.trials if t.trial.bench.get("name") == bench)
-
 
 def choose(results: Path, named: str) -> ChosenRun:
     """Select the trials of `RUN` or `RUN:TEST`. Raises UsageError without such a test or trial."""

@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any, Self, TypeVar
 
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.contrast import excludes_zero
 from campaign.estimation.difference import Difference, difference_of
 from campaign.estimation.family import RATE, adjusted
 from campaign.reason import NONE, Cause, Reason
@@ -117,9 +118,3 @@ def _with(pair: J, p: float) -> J:
     declared = p <= RATE and excludes_zero(pair.found.difference)
     verdict = Verdict.DIFFERENT if declared else Verdict.NOT_SHOWN
     return replace(pair, verdict=verdict, adjusted=p)
-
-
-def excludes_zero(estimate: Estimate) -> bool:
-    """Whether the interval, or the bound, of the estimate excludes zero."""
-    low, high = estimate.combined
-    return (low is not None and low > 0) or (high is not None and high < 0)

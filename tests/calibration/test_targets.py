@@ -9,12 +9,12 @@ import pytest
 
 from campaign.calibration.targets import (
     Target,
-    covers,
     make_target,
     restricted,
     shortest,
     weight_of,
 )
+from campaign.published.patterns import covers
 from campaign.published.values import Cell, thesis
 from campaign.published.verdicts import ReproducedNumber, deviation, judge
 
@@ -102,6 +102,6 @@ def test_fitted_names_whole_tables_and_rows() -> None:
     names = shortest([make_target(cell, "1 %") for cell in wanted], thesis())
     assert names[:2] == ("5.10", "5.11/0.2")
     assert names[-3:] == ("5.11/2.0/none", "5.11/2.0/static", "5.11/2.0/lugre")
-    assert {c.path for c in of("5.10", "5.11") if any(covers(n, c) for n in names)} == {
+    assert {c.path for c in of("5.10", "5.11") if any(covers(n, c.path) for n in names)} == {
         cell.path for cell in wanted
     }

@@ -202,7 +202,7 @@ def test_short_trials_are_regressed_on_fewer_commands_or_refused() -> None:
 @pytest.mark.slow
 def test_noise_of_the_torque_stiffens_what_is_found_where_it_is_taken_for_torque() -> None:
     records = [Record(STEP, drive.torque, rate=rate) for drive, rate in measured(0, 0.3)]
-    assert identify_presliding_dynamics(records).plant.inertia > 1.05 * INERTIA
+    assert identify_presliding_dynamics(records).fit.plant.inertia > 1.05 * INERTIA
 
 
 def hits(seed: int, doubt: bool) -> list[bool]:
@@ -230,8 +230,10 @@ def test_intervals_hold_with_what_is_left_to_doubt_of_the_torque() -> None:
 @pytest.mark.slow
 def test_deviations_by_scores_know_what_is_left_to_doubt_of_the_torque() -> None:
     """Of white noise they are those of independent residuals and of what is known beforehand."""
-    spread = identified(3, doubt=True).spread
-    assert spread.by_bandwidth[1] == pytest.approx(spread.ordinary, rel=0.1)
+    found = identified(3, doubt=True)
+    ordinary = np.sqrt(np.diag(np.linalg.inv(found.fit.information)))
+    deviation = found.spread.deviation
+    assert deviation == pytest.approx(ordinary[: len(deviation)], rel=0.1)
 
 
 def test_records_that_doubt_other_things_are_not_fitted_together() -> None:

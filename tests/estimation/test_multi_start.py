@@ -150,7 +150,7 @@ def test_starts_follow_from_the_seed_and_keep_clear_of_the_bounds() -> None:
 
 def test_agreement_is_within_a_hundredth() -> None:
     def ended(*costs: float) -> list[Start]:
-        return [Start(np.zeros(1), np.zeros(1), each, "converged") for each in costs]
+        return [Start(np.zeros(1), each, "converged") for each in costs]
 
     assert agreeing([]) == 0
     assert agreeing(ended(0.012, 0.001, 0.0109)) == 1 + 1  # within 0.01 of the best cost

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.frequency.drive import TwoMass
+from campaign.estimation.frequency.drive import TwoMass, not_determined
 from campaign.estimation.frequency_response import HELD
 from campaign.experiments.frequency_response.model.analysis import _parameters
 from campaign.experiments.frequency_response.model.axis_numbers import (
@@ -131,17 +131,9 @@ def number(name: str, value: float, error: float = 0.001) -> Estimate:
 
 def drive(**values: float) -> TwoMass:
     """One with these numbers; the others are not determined."""
-    names = (
-        "motor_inertia", "load_inertia", "total_inertia", "stiffness", "damping", "resonance",
-        "resonance_damping", "antiresonance", "antiresonance_damping", "inertia_ratio",
-    )  # fmt: skip
-    nothing = {
-        name: Estimate.without_interval(name, math.nan, "", Reason("test", "not looked at"))
-        for name in names
-    }
-    told_ = {name: number(name, value) for name, value in values.items()}
+    nothing = not_determined(Reason("test", "not looked at"))
     return TwoMass(
-        **{**nothing, **told_},
+        nothing | {name: number(name, value) for name, value in values.items()},
         misfit="",
         excess=1.0,
         criterion=0.0,
@@ -152,7 +144,7 @@ def drive(**values: float) -> TwoMass:
 
 
 def parts(found: TwoMass, name: str) -> Sequence[float | None]:
-    return [each.standard_uncertainty for each in getattr(found, name).systematic]
+    return [each.standard_uncertainty for each in found.estimates[name].systematic]
 
 
 def test_without_distortion_the_response_is_the_axis() -> None:
@@ -166,10 +158,10 @@ def test_little_distortion_widens_and_much_withholds() -> None:
     assert parts(little, "total_inertia") == [pytest.approx(0.02)]
     assert parts(little, "resonance") == [pytest.approx(0.006)]
     # What friction adds to a damping no level of distortion bounds.
-    assert little.damping.reason in UNKNOWN
+    assert little.estimates["damping"].reason in UNKNOWN
     much = of_axis(one, 1.01 * BENT, ())
-    assert much.total_inertia.reason == much.resonance.reason == UNKNOWN()
-    assert math.isnan(much.total_inertia.value)
+    assert much.estimates["total_inertia"].reason == much.estimates["resonance"].reason == UNKNOWN()
+    assert math.isnan(much.estimates["total_inertia"].value)
     assert by_rule(number("antiresonance", 11.0), 0.0).systematic == ()
 
 
@@ -179,8 +171,8 @@ def test_a_share_that_falls_slowly_is_still_held() -> None:
         strong = drive(total_inertia=2.0 * (1.0 - bias))
         weak = drive(total_inertia=2.0 * (1.0 - bias * 2.0**fall))
         found = of_axis(strong, 0.1, [Weaker(weak, 2.0)])
-        assert holds(found.total_inertia, 2.0)
-        assert found.total_inertia.origin is Origin.MEASURED
+        assert holds(found.estimates["total_inertia"], 2.0)
+        assert found.estimates["total_inertia"].origin is Origin.MEASURED
 
 
 def test_the_weaker_that_says_most_counts_and_agreement_is_no_proof() -> None:
@@ -195,7 +187,7 @@ def test_the_weaker_that_says_most_counts_and_agreement_is_no_proof() -> None:
 def test_a_weaker_that_fits_nothing_tells_nothing() -> None:
     misfit = replace(drive(), misfit="it leaves more than scatter")
     found = of_axis(drive(total_inertia=2.0), 0.1, [Weaker(misfit, 2.0)])
-    assert found.total_inertia.reason in UNKNOWN
+    assert found.estimates["total_inertia"].reason in UNKNOWN
 
 
 @pytest.mark.parametrize("told_too", [{}, {"resonance": 12.0}])

@@ -142,7 +142,7 @@ def test_the_observer_gets_the_inertia_and_its_interval() -> None:
 
 
 def test_a_curve_of_one_direction_goes_nowhere() -> None:
-    assert entries(text_of("platform"), friction_map=curve()[:4]).names == ()
+    assert entries(text_of("platform"), friction_map=curve()[:4]).values == {}
 
 
 def test_a_number_without_an_interval_goes_nowhere() -> None:
@@ -151,7 +151,7 @@ def test_a_number_without_an_interval_goes_nowhere() -> None:
         "",
         bench="axis.inertia",
     )
-    assert entries(text_of("platform"), presliding=[alone]).names == ()
+    assert entries(text_of("platform"), presliding=[alone]).values == {}
 
 
 def test_twins_of_before_are_taken_out() -> None:

@@ -11,9 +11,9 @@ import pytest
 
 from campaign.estimation.inverse.motion import (
     FilterSettings,
-    LateRows,
     Motion,
     decimated,
+    late_rows,
     later,
     motion_of_position,
     motion_of_rate,
@@ -36,11 +36,11 @@ from tests.estimation.rigs import random_rigs
 def test_a_delay_and_a_low_pass_may_be_exchanged(decimation: int) -> None:
     force = np.cumsum(np.random.default_rng(1).standard_normal(4000))
     filtering = FilterSettings(100.0, decimation, skip=7)
-    kept = LateRows(force, 1000.0, filtering)
+    kept = late_rows(force, 1000.0, filtering)
     inner = slice(40, -40)
     for delay in (0.0, 0.0031, -0.0047):
         old = decimated(later(force, delay, 1000.0)[7:, None], decimation)[:, 0]
-        assert kept.at(delay)[inner] == pytest.approx(old[inner], abs=2e-4 * np.std(force))
+        assert kept(delay)[inner] == pytest.approx(old[inner], abs=2e-4 * np.std(force))
 
 
 def test_a_column_is_filtered_once_for_each_motion() -> None:

@@ -1,1 +1,1 @@
-"""Motions and torques made to identify from: pure functions on arrays, all of them seeded."""
+"""Excitation signals for identification: pure, seeded functions on arrays."""

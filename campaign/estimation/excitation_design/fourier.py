@@ -1,9 +1,9 @@
 """Fourier series of an angle, optimized for inverse dynamics.
 
-Its coefficients are searched for the lowest condition number of the model's columns, within limits
-on angle, rate and acceleration (Swevers, Ganseman, Tükel, De Schutter and Van Brussel, "Optimal
-robot excitation and identification", IEEE Trans. Robot. Autom. 13 (1997) 730). Columns count with
-unit length, so that no choice of units decides; the series is then as large as the limits let it.
+The coefficients minimize the condition number of the model's columns, within limits on angle, rate
+and acceleration (Swevers, Ganseman, Tükel, De Schutter and Van Brussel, "Optimal robot excitation
+and identification", IEEE Trans. Robot. Autom. 13 (1997) 730). Columns are scaled to unit length,
+so that the result is independent of units. The series is as large as the limits allow.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from campaign.estimation.inverse.terms import TERMS
 from campaign.signals import MultiSine
 
 PER_CYCLE = 64
-"""Points per cycle of the highest harmonic, at which a series is looked at."""
+"""Points per cycle of the highest harmonic, at which a series is evaluated."""
 STILL = 0.02
-"""of the largest rate: slower samples do not count; friction there is whatever holds the axis."""
+"""Share of the largest rate below which samples do not count: friction there equals the force."""
 POPULATION = 40
-"""Series that a search carries on with."""
+"""Number of series in the population of the search."""
 SCALES, CROSSED = (0.4, 0.9), 0.9
-"""Differential evolution: range of its scale factor, and share of coefficients that it crosses."""
+"""Differential evolution: range of the scale factor, and crossover probability."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """Largest magnitudes that a series may have; rad, rad/s, rad/s^2, or m of a linear axis.
+    """Largest magnitudes of a series; rad, rad/s, rad/s^2, or m for a linear axis.
 
-    angle: of the swing around its middle.
+    angle: distance from the middle.
     """
 
     angle: float
@@ -56,7 +56,7 @@ class FourierSeries:
     cosine: tuple[float, ...]
 
     def sample(self, time: Array, order: int = 0) -> Array:
-        """The angle or its `order`-th derivative at `time` (s), shape (n,), in closed form."""
+        """Angle (rad) or its `order`-th derivative at `time` (s), shape (n,)."""
         omega = 2.0 * np.pi * np.arange(1.0, len(self.sine) + 1.0) / self.period
         turned = np.outer(time, omega) + 0.5 * np.pi * order
         sized = omega**order
@@ -66,7 +66,7 @@ class FourierSeries:
 
     @property
     def rate(self) -> MultiSine:
-        """Its first derivative as a signal (rad/s)."""
+        """First derivative as a signal (rad/s)."""
         sine, cosine = np.array(self.sine), np.array(self.cosine)
         harmonic = np.arange(1.0, len(sine) + 1.0)
         size = np.hypot(sine, cosine) * 2.0 * np.pi * harmonic / self.period
@@ -77,7 +77,7 @@ class FourierSeries:
         )
 
     def motion(self, middle: float = 0.0) -> Motion:
-        """One period on a grid that misses no extreme by more than 0.12 %, around `middle`."""
+        """One period around `middle`, on a grid with an error of extremes of at most 0.12 %."""
         time = _grid(len(self.sine)) * self.period
         angle, rate, acceleration = (self.sample(time, order) for order in range(3))
         return Motion(time, middle + angle, rate, acceleration, np.zeros_like(time))
@@ -90,34 +90,34 @@ def _grid(harmonics: int) -> Array:
 
 
 def condition(motion: Motion, terms: Sequence[str]) -> float:
-    """Condition number of the columns of these terms, each of unit length; infinite for none.
+    """Condition number of the terms' columns at unit length; infinite for a column of zeros.
 
-    Samples that are slower than `STILL` of the largest rate do not count.
+    Samples slower than `STILL` of the largest rate do not count.
     """
     columns = np.stack([TERMS[name].column(motion) for name in terms], axis=-1)
     return float(_conditions((columns * _moves(motion.rate)[:, None])[None])[0])
 
 
 def _moves(rate: Array) -> Array:
-    """1 where a series moves and 0 where it stands still; rate: shape (..., n), as what returns."""
+    """1 where a series moves, 0 at standstill, shape of `rate` (..., n)."""
     size = np.abs(rate)
     return np.asarray(size >= STILL * np.max(size, axis=-1, keepdims=True), dtype=float)
 
 
 def _conditions(columns: Array) -> Array:
-    """Of each of p sets of columns, shape (p, n, k): shape (p,)."""
+    """Condition numbers, shape (p,), of p sets of columns, shape (p, n, k)."""
     length = np.linalg.norm(columns, axis=1)
     alike = np.einsum("pnk,pnl->pkl", columns, columns)
     product = length[:, :, None] * length[:, None, :]
     whole = np.all(length > 0, axis=1)
-    found = np.full(len(columns), np.inf)
+    numbers = np.full(len(columns), np.inf)
     values = np.linalg.eigvalsh(alike[whole] / product[whole])
     with np.errstate(divide="ignore"):
-        found[whole] = np.sqrt(values[:, -1] / np.maximum(values[:, 0], 0.0))
-    return found
+        numbers[whole] = np.sqrt(values[:, -1] / np.maximum(values[:, 0], 0.0))
+    return numbers
 
 
-@lru_cache(maxsize=32)  # a plan asks for the same one again and again
+@lru_cache(maxsize=32)  # a plan uses the same series many times
 def best_series(
     period: float,
     harmonics: int,
@@ -127,17 +127,17 @@ def best_series(
     generations: int,
     seed: int,
 ) -> FourierSeries:
-    """The series with the lowest condition number that a seeded search finds.
+    """Series with the lowest condition number in a seeded search.
 
-    By differential evolution (Storn and Price, J. Global Optim. 11 (1997) 341) from random series.
-    Rate and acceleration begin at zero, so that a bench at rest is not jerked.
+    Differential evolution (Storn and Price, J. Global Optim. 11 (1997) 341) from random series.
+    Rate and acceleration begin at zero, so that a bench at rest has no jerk.
 
     Args:
         terms: names of the model's terms (`estimation.inverse.terms`).
-        middle: angle around which it swings (rad): gravity depends on it.
+        middle: middle angle of the motion (rad): gravity depends on it.
 
-    Raises ValueError for fewer than two harmonics, no room, a term that there is not, and terms
-    that no motion separates.
+    Raises ValueError for fewer than two harmonics, no room, an unknown term, and terms that no
+    motion separates.
     """
     unknown = [name for name in terms if name not in TERMS or "temperature" in name]
     if unknown:
@@ -163,27 +163,22 @@ def best_series(
         best[better], scores[better] = tried[better], fresh[better]
     if not np.isfinite(np.min(scores)) or np.min(scores) > 1e6:
         raise ValueError(f"no motion separates {', '.join(terms)}: leave out one of them")
-    return _series(period, best[int(np.argmin(scores))])
-
-
-def _series(period: float, coefficients: Array) -> FourierSeries:
-    half = len(coefficients) // 2
-    sine, cosine = coefficients[:half], coefficients[half:]
+    sine, cosine = np.split(best[int(np.argmin(scores))], 2)
     return FourierSeries(period, tuple(map(float, sine)), tuple(map(float, cosine)))
 
 
 def _allowed(coefficients: Array, period: float, room: Room) -> Array:
-    """The nearest that begin at rest, as large as the room lets them, shape (p, 2 harmonics)."""
+    """Nearest series that begin at rest, scaled to the limits, shape (p, 2 harmonics)."""
     half = coefficients.shape[1] // 2
     harmonic = np.arange(1.0, half + 1.0)
     sine, cosine = coefficients[:, :half], coefficients[:, half:]
-    # No rate at the beginning: sum of k sine[k]; no acceleration: sum of k^2 cosine[k].
+    # Initial rate 0: sum of k sine[k] = 0; initial acceleration 0: sum of k^2 cosine[k] = 0.
     sine = sine - np.outer(sine @ harmonic, harmonic) / np.sum(harmonic**2)
     cosine = cosine - np.outer(cosine @ harmonic**2, harmonic**2) / np.sum(harmonic**4)
     rested = np.concatenate([sine, cosine], axis=1)
     bounds = (room.angle, room.rate, room.acceleration)
     peaks = [np.max(np.abs(each), axis=1) for each in _path(rested, period)]
-    # Between the points a series of that degree is at most so much larger (Ehlich and Zeller 1964).
+    # Upper bound of the values between the points of the grid (Ehlich and Zeller 1964).
     between = 1.0 / math.cos(math.pi / PER_CYCLE)
     used = np.max([between * p / bound for p, bound in zip(peaks, bounds, strict=True)], axis=0)
     return np.asarray(rested / np.maximum(used, 1e-300)[:, None])

@@ -13,39 +13,39 @@ from campaign.signals import MultiSine
 POINTS = 16
 """Points per cycle of the highest line."""
 CLIPPED = (0.75, 0.98)
-"""of its peak at which a signal is clipped, in the first round and in the last."""
+"""Clipping level over the peak of the signal, in the first and in the last round."""
 BISECTIONS = 60
-"""of a search for a passage, after which the interval is 1e-18 of the first one."""
+"""Bisections of a search for a zero: they reduce the interval to 1e-18 of the first one."""
 ROUNDS = 400
-"""of the search."""
+"""Rounds of the search for a low crest factor."""
 
 
 def odd_multisine(grid: OddGrid, seed: int, draws: int, *, lowered: bool, order: int) -> MultiSine:
-    """One realisation on the lines of a grid, of rms 1.
+    """One realisation on the lines of a grid, with rms 1.
 
     Args:
-        draws: how many sets of random phases, of which the one with the lowest crest factor counts.
-        lowered: whether phases are then changed to lower it further (`low_crest`).
-        order: it begins where its `order`-th integral of zero mean passes zero: 0 for a rate, which
-            then begins at rest, 1 for a torque, after which a free load does not drift.
+        draws: number of sets of random phases; the one with the lowest crest factor is used.
+        lowered: whether a search then reduces the crest factor further (`low_crest`).
+        order: the signal begins at a zero of its `order`-th integral of zero mean: 0 for a rate,
+            which then begins at rest; 1 for a torque, so that a free load does not drift.
     """
     signal = random_phases(grid, 1.0, seed, draws=draws)
     phases = np.array(signal.phases)
     if lowered:
         phases = low_crest(grid.excited, phases)
-    begun = _begun(grid.excited, phases, order)
+    phases = _shifted(grid.excited, phases, order)
     frequencies = tuple(float(f"{f:.12g}") for f in grid.frequency)
     return MultiSine(
-        amplitudes=signal.amplitudes, frequencies=frequencies, phases=tuple(map(float, begun))
+        amplitudes=signal.amplitudes, frequencies=frequencies, phases=tuple(map(float, phases))
     )
 
 
 def low_crest(lines: Lines, phases: Array) -> Array:
-    """Phases (rad) of sines of equal size with a lower crest factor than those that it begins with.
+    """Phases (rad) of sines of equal size with a lower crest factor, from start values (k,).
 
-    A signal is clipped, and its phases are kept (Van der Ouderaa, Schoukens and Renneboog, IEEE
-    Trans. Instrum. Meas. 37 (1988) 145); the best of all rounds counts. lines: multiples of the
-    base frequency, shape (k,), as phases.
+    In each round the signal is clipped and only its phases are kept (Van der Ouderaa, Schoukens and
+    Renneboog, IEEE Trans. Instrum. Meas. 37 (1988) 145). Returns those of the best round. lines:
+    multiples of the base frequency, shape (k,).
     """
     count = POINTS * int(lines[-1])
     best, lowest = phases, np.inf
@@ -61,7 +61,7 @@ def low_crest(lines: Lines, phases: Array) -> Array:
 
 
 def peak(signal: MultiSine, period: float) -> float:
-    """Largest magnitude of a multisine of that period (s), on 64 points of its fastest cycle."""
+    """Largest magnitude of a multisine with a period (s), at 64 points of its fastest cycle."""
     count = 4 * POINTS * round(max(signal.frequencies) * period)
     lines = np.round(np.array(signal.frequencies) * period).astype(int)
     phases = np.array(signal.phases)
@@ -74,8 +74,8 @@ def crest_factor(signal: MultiSine, period: float) -> float:
     return peak(signal, period) / float(rms)
 
 
-def _begun(lines: Lines, phases: Array, order: int) -> Array:
-    """The same signal from where its `order`-th integral first passes zero."""
+def _shifted(lines: Lines, phases: Array, order: int) -> Array:
+    """Phases of the signal shifted in time to the first zero of its `order`-th integral."""
     count = POINTS * int(lines[-1])
     signal = course(lines, phases, count, 1.0, order)
     size = 1.0 / lines.astype(float) ** order
@@ -88,10 +88,10 @@ def _begun(lines: Lines, phases: Array, order: int) -> Array:
 
 
 def first_passage(course: Array, value: Callable[[float], float]) -> float:
-    """Share of its period at which a signal first passes zero, to all digits.
+    """First zero of a periodic signal, as a share of its period, to the last digit.
 
-    course: one period of it, evenly sampled, finely enough that its first change of sign between
-    two samples is a single passage. value: the signal itself, at a share of its period.
+    course: one period, evenly sampled; the first pair of samples of opposite sign must enclose a
+        single zero. value: signal at a share of its period.
     """
     index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
     low, high = index / len(course), (index + 1) / len(course)

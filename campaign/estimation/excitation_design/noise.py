@@ -8,20 +8,18 @@ from campaign.arrays import Array, ComplexArray
 from campaign.estimation.excitation_design.multisines import first_passage
 from campaign.estimation.frequency.multisine import Lines
 
-Spectrum = ComplexArray
-
 
 def band_noise(
     lowest: float, highest: float, duration: float, rate: float, seed: int, order: int = 0
 ) -> Array:
-    """Samples at `rate` (Hz), shape (duration * rate + 1,), of rms 1 and of no mean.
+    """Samples at `rate` (Hz), shape (duration * rate + 1,), with rms 1 and zero mean.
 
-    White Gaussian noise behind a filter without phase and with straight edges, which one transform
-    of the whole makes. The first and the last sample are one: it begins where its `order`-th
-    integral passes zero.
+    White Gaussian noise after an ideal band-pass without phase, by a Fourier transform of the whole
+    signal. The signal is periodic, so that the last sample is equal to the first; it begins at a
+    zero of its `order`-th integral.
 
-    Raises ValueError where the band has fewer than two lines of the duration, or reaches beyond
-    half the rate.
+    Raises ValueError where the band has fewer than two lines of the duration, or exceeds half the
+    rate.
     """
     count = round(duration * rate)
     first, last = int(np.ceil(lowest * duration - 1e-9)), int(highest * duration + 1e-9)
@@ -42,12 +40,12 @@ def band_noise(
     noise = np.fft.irfft(spectrum * np.exp(2j * np.pi * lines * turn), count)
     noise /= np.sqrt(np.mean(noise**2))
     if order == 0:
-        noise[0] = 0.0  # of which rounding leaves something, and a jump asks for any acceleration
+        noise[0] = 0.0  # without the rounding error: a jump of a rate is an infinite acceleration
     return np.append(noise, noise[0])
 
 
-def _passage(spectrum: Spectrum, lines: Lines, count: int) -> float:
-    """Share of the period at which a signal of these lines passes zero, exactly."""
+def _passage(spectrum: ComplexArray, lines: Lines, count: int) -> float:
+    """First zero of the signal with these lines, as a share of its period."""
     whole = np.zeros(count // 2 + 1, dtype=complex)
     whole[lines] = spectrum
     course = np.fft.irfft(whole, count)

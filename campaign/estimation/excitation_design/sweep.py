@@ -1,4 +1,4 @@
-"""A chirp: a sine with a swept frequency, as points."""
+"""Chirp: a sine with a swept frequency, as points."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from campaign.arrays import Array
 
 Law = Literal["linear", "logarithmic"]
 PER_CYCLE = 32
-"""Points per cycle: straight lines between them miss the sine by half a percent at most."""
+"""Points per cycle: straight lines between them have an error of at most half a percent."""
 
 
 @dataclass(frozen=True)
 class Chirp:
-    """sin(phase(t)), from 0 to a whole number of cycles.
+    """sin(phase(t)) with a whole number of cycles.
 
     Attributes:
         lowest, highest: frequency at the beginning and at the end (Hz).
         duration: (s).
-        law: linear: the frequency grows by the same each second; logarithmic: by the same factor.
+        law: whether the frequency or its logarithm is linear in time.
     """
 
     lowest: float
@@ -30,23 +30,16 @@ class Chirp:
     duration: float
     law: Law
 
-    def frequency(self, time: Array) -> Array:
-        """At once, at `time` (s), shape (n,) (Hz)."""
-        share = time / self.duration
-        if self.law == "linear":
-            return np.asarray(self.lowest + (self.highest - self.lowest) * share)
-        return np.asarray(self.lowest * (self.highest / self.lowest) ** share)
-
     def phase(self, time: Array) -> Array:
-        """The integral of 2 pi `frequency` from 0, at `time` (s), shape (n,) (rad)."""
+        """Phase (rad) at `time` (s), shape (n,): the integral of 2 pi times the frequency."""
         share = time / self.duration
         if self.law == "linear":
             cycles = (
                 self.duration * share * (self.lowest + 0.5 * (self.highest - self.lowest) * share)
             )
         else:
-            grown = math.log(self.highest / self.lowest)
-            cycles = self.duration * self.lowest * np.expm1(grown * share) / grown
+            growth = math.log(self.highest / self.lowest)
+            cycles = self.duration * self.lowest * np.expm1(growth * share) / growth
         return np.asarray(2.0 * np.pi * cycles)
 
     def points(self) -> Array:
@@ -57,13 +50,13 @@ class Chirp:
             slope = (self.highest - self.lowest) / self.duration
             time = 2.0 * cycles / (self.lowest + np.sqrt(self.lowest**2 + 2.0 * slope * cycles))
         else:
-            grown = math.log(self.highest / self.lowest) / self.duration
-            time = np.log1p(grown * cycles / self.lowest) / grown
+            growth = math.log(self.highest / self.lowest) / self.duration
+            time = np.log1p(growth * cycles / self.lowest) / growth
         return np.minimum(time, self.duration)
 
 
 def chirp(lowest: float, highest: float, duration: float, law: Law) -> Chirp:
-    """A sweep of about that duration (s): of a whole number of cycles, so that it ends at 0.
+    """Sweep of about a duration (s), with a whole number of cycles, so that it ends at 0.
 
     Raises ValueError where `highest` is not above `lowest`, and for less than a cycle.
     """

@@ -17,7 +17,7 @@ from campaign.estimation.frequency.distortion import Distortion, detected
 from campaign.estimation.frequency.line_spectra import LineSpectra, line_spectra
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.multisine import Lines
-from campaign.estimation.frequency.welch import Excited
+from campaign.estimation.frequency.welch import NO_REFERENCE, Excited
 
 FEWEST_REALISATIONS = 7
 """Least number for which their variance is a weight for a fit (Pintelon, Schoukens: 4.3.1)."""
@@ -62,14 +62,13 @@ class Excitation:
 
 @dataclass(frozen=True)
 class BestLinear:
-    """Response at the excited lines, with noise, distortion and transient of the output.
+    """Response at the excited lines, with noise and distortion of the output.
 
     Attributes:
         response: its variance over realisations contains noise and stochastic nonlinear part;
             with a single realisation only noise (see `undetermined`).
         noise: variance of the response by noise, shape (n,); NaN for a single period.
         distortion: output at the detection lines; None for a single period.
-        transient: largest share of transient or drift in the output at an excited line.
         undetermined: sentences on what this measurement does not determine, and why.
     """
 
@@ -77,7 +76,6 @@ class BestLinear:
     noise: Array
     distortion: Distortion | None
     excitation: Excitation
-    transient: float
     undetermined: tuple[str, ...]
 
 
@@ -104,10 +102,7 @@ def best_linear(
     line without input.
     """
     if acts_on == "reference" and reference is None:
-        raise ValueError(
-            "a closed loop without its reference: output over input would be a mixture of the "
-            "plant and its controller; record what comes into the loop from outside"
-        )
+        raise ValueError(NO_REFERENCE)
     signals = [np.atleast_2d(input_), np.atleast_2d(output)]
     if reference is not None:
         signals.append(np.atleast_2d(reference))
@@ -124,16 +119,7 @@ def best_linear(
     distortion = None
     if spectra.noise is not None:
         distortion = detected(spectra, spectra.noise, excited, response.values)
-    level = np.mean(np.abs(spectra.lines[1][:, excited - 1]), axis=0)
-    passing = np.mean(np.abs(spectra.transient[1][:, excited - 1]), axis=0)
-    return BestLinear(
-        response,
-        noise,
-        distortion,
-        described,
-        float(np.max(passing / np.maximum(level, 1e-300))),
-        _undetermined(described),
-    )
+    return BestLinear(response, noise, distortion, described, _undetermined(described))
 
 
 def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -39,15 +38,12 @@ Correlations = Mapping[tuple[str, str], float]
 
 @dataclass(frozen=True)
 class TwoMass:
-    """Two-mass drive; quantities that the responses do not determine are *not determined*.
+    """Two-mass drive.
 
     Attributes:
-        motor_inertia, load_inertia, total_inertia: (kg m^2).
-        stiffness: (N m/rad). damping: (N m s/rad).
-        resonance_damping: damping ratio of the resonance.
-        resonance, antiresonance: undamped, sqrt(k (1/J1 + 1/J2)) and sqrt(k / J2) over 2 pi (Hz).
-        antiresonance_damping: d / (2 sqrt(k J2)).
-        inertia_ratio: J2 / J1.
+        estimates: by the names of `UNITS`; *not determined* where the responses do not determine
+            them. Resonance and antiresonance are undamped, sqrt(k (1/J1 + 1/J2)) and sqrt(k / J2)
+            over 2 pi (Hz). `antiresonance_damping` is d / (2 sqrt(k J2)), `inertia_ratio` J2 / J1.
         misfit: why such a drive is no model of the responses; `NONE` where it may be one.
         excess: weighted square over its expectation for a correct model.
         criterion: Schwarz' (BIC).
@@ -61,16 +57,7 @@ class TwoMass:
         condition: number of the weighted Jacobian, its columns scaled to length 1.
     """
 
-    motor_inertia: Estimate
-    load_inertia: Estimate
-    total_inertia: Estimate
-    stiffness: Estimate
-    damping: Estimate
-    resonance: Estimate
-    resonance_damping: Estimate
-    antiresonance: Estimate
-    antiresonance_damping: Estimate
-    inertia_ratio: Estimate
+    estimates: Mapping[str, Estimate]
     misfit: Reason
     excess: float
     criterion: float
@@ -109,9 +96,12 @@ class TwoMass:
         return polynomials(self.point, side)
 
 
-def untold(names: Iterable[str], reason: Reason) -> dict[str, Any]:
-    """Estimates, not determined, of these names."""
-    return {name: Estimate.without_interval(name, math.nan, UNITS[name], reason) for name in names}
+def not_determined(reason: Reason) -> dict[str, Estimate]:
+    """Estimates of all quantities, not determined."""
+    return {
+        name: Estimate.without_interval(name, math.nan, unit, reason)
+        for name, unit in UNITS.items()
+    }
 
 
 def correlations_of(names: Sequence[str], gradients: Array, spread: Array) -> Correlations:

@@ -9,7 +9,7 @@ Pintelon and Schoukens (2012), 7.2).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -32,7 +32,6 @@ class LineSpectra:
     Attributes:
         frequency: of the lines (Hz), shape (n,).
         lines: without transient, shape (c, m, n): a sine of amplitude a has |line| = a.
-        transient: the subtracted part, shape (c, m, n); zero for a single period.
         noise: covariance E[e e*] of `lines` in one realisation, shape (n, c, c), a mean over the
             realisations; None for a single period.
         freedom: real degrees of freedom of `noise`.
@@ -41,7 +40,6 @@ class LineSpectra:
 
     frequency: Array
     lines: ComplexArray
-    transient: ComplexArray
     noise: ComplexArray | None
     freedom: float
     periods: int
@@ -54,9 +52,7 @@ class LineSpectra:
     def conjugated(self, phase: ComplexArray) -> LineSpectra:
         """Rotate back by a phase for each realisation and line, |phase| = 1, shape (m, n)."""
         turned = self.lines * np.conj(phase)
-        return LineSpectra(
-            self.frequency, turned, self.transient, self.noise, self.freedom, self.periods
-        )
+        return replace(self, lines=turned)
 
 
 def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> LineSpectra:
@@ -78,11 +74,10 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
         raise ValueError(f"no line of the period lies below {highest:g} Hz")
     at = periods * np.arange(1, count + 1)
     frequency = at * rate / total
-    own = bins[..., at]
+    lines = bins[..., at]
     if periods == 1:
-        return LineSpectra(frequency, own, np.zeros_like(own), None, 0.0, 1)
+        return LineSpectra(frequency, lines, None, 0.0, 1)
     channels, realisations = signals.shape[:2]
-    transient = np.zeros_like(own)
     noise = np.zeros((count, channels, channels), dtype=complex)
     free = float(AROUND - ORDER - 1)
     for k, bin_ in enumerate(at.tolist()):
@@ -91,14 +86,12 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
         )
         around = bins[..., bin_ + away]
         fit = around @ inverse.T
-        transient[..., k] = fit[..., 0]
+        lines[..., k] -= fit[..., 0]
         left = around - fit @ basis.T
         spread = np.einsum("amj,bmj->ab", left, np.conj(left)) / (free * realisations)
         # The subtracted transient adds its own noise, by `inverse`, to that of the line.
         noise[k] = spread * (1.0 + float(np.sum(inverse[0] ** 2)))
-    return LineSpectra(
-        frequency, own - transient, transient, noise, 2.0 * free * realisations, periods
-    )
+    return LineSpectra(frequency, lines, noise, 2.0 * free * realisations, periods)
 
 
 @cache

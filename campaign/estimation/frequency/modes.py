@@ -11,7 +11,7 @@ from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.orders import ChosenOrder, root_jacobian, with_order
 from campaign.estimation.frequency.rational import RationalFit
-from campaign.estimation.gate import admitted
+from campaign.estimation.gate import admitted, refused
 from campaign.estimation.intervals import MODEL_MISFIT, with_error
 from campaign.reason import Cause, Reason
 
@@ -107,11 +107,10 @@ def _mode(
     )
     if fit.lowest <= frequency <= fit.highest:
         return mode
-    reason = OUTSIDE()
     return replace(
         mode,
-        frequency=replace(mode.frequency, origin=Origin.NOT_DETERMINED, reason=reason),
-        damping=replace(mode.damping, origin=Origin.NOT_DETERMINED, reason=reason),
+        frequency=refused(mode.frequency, OUTSIDE()),
+        damping=refused(mode.damping, OUTSIDE()),
     )
 
 

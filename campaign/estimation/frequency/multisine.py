@@ -106,7 +106,7 @@ ALIKE = 1e-3
 UNLIKE = 0.5
 """Least value of this ratio between repetitions."""
 LOOKED_AT = 1 << 21
-"""Samples at the end of a recording that are used."""
+"""Most samples at the end of a recording that are used."""
 STRONG, MANY = 0.2, 10
 """Least amplitude of a strong line over the largest, and least number of them in a multisine."""
 

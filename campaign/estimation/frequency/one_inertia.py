@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from campaign.estimation.frequency.drive import (
     UNITS,
     TwoMass,
     correlations_of,
-    untold,
+    not_determined,
 )
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
@@ -34,9 +33,7 @@ RIGID = Cause(
 NEGATIVE_INERTIA = Cause("negative inertia", "its inertia would be negative")
 NO_RESONANCE = Cause("no resonance in band", "no resonance of two inertias lies in the band")
 METHOD = "One inertia with viscous friction and a delay, least squares weighted by scatter"
-OF_ONE = ("total_inertia",)
-"""Quantities of a drive with one inertia."""
-AT_LOAD = (*OF_ONE, "resonance", "resonance_damping")
+AT_LOAD = ("total_inertia", "resonance", "resonance_damping")
 """Quantities that a sensor at the load alone determines."""
 
 
@@ -53,13 +50,12 @@ def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
         misfit = NEGATIVE_INERTIA()
     total = of_fit("total_inertia", inertia, "kg m^2", error, misfit, METHOD)
     return TwoMass(
-        **untold(UNITS.keys() - OF_ONE, RIGID()),
-        total_inertia=total,
+        not_determined(RIGID()) | {"total_inertia": total},
         misfit=misfit,
         excess=fit.excess,
         criterion=fit.criterion,
         sides=(side,),
-        point=np.concatenate([fit.numerator, fit.denominator, [fit.delay]]),
+        point=fit.vector,
         grounded=False,
         rigid=True,
         function=fit,
@@ -93,7 +89,7 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
         root = max(roots, key=abs)
         return np.array([total / unit, rise / (2.0 * math.pi), -root.real / abs(root)])
 
-    theta = np.concatenate([fit.numerator, fit.denominator, [fit.delay]])
+    theta = fit.vector
     values = told(theta)
     by = gradients(told, theta, np.maximum(1e-5 * np.abs(theta), 1e-12))
     error = propagated(by, fit.scatter)
@@ -101,13 +97,12 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
     misfit = fit.misfit
     if not misfit and (values[0] <= 0 or not fit.lowest <= values[1] <= fit.highest):
         misfit = NO_RESONANCE()
-    estimates: dict[str, Any] = {
+    estimates = {
         name: of_fit(name, float(value), UNITS[name], float(by_fit), misfit, method)
         for name, value, by_fit in zip(AT_LOAD, values, error, strict=True)
     }
     return TwoMass(
-        **estimates,
-        **untold(UNITS.keys() - AT_LOAD, HIDDEN()),
+        not_determined(HIDDEN()) | estimates,
         misfit=misfit,
         excess=fit.excess,
         criterion=fit.criterion,

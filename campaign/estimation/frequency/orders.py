@@ -34,18 +34,10 @@ INTEGRATOR = 0.5
 
 @dataclass(frozen=True)
 class ChosenOrder:
-    """The chosen fit, with all tried and refused orders.
-
-    Attributes:
-        tried: fits by order of numerator and denominator.
-        refused: reason by order.
-        near: other fits that the data do not exclude.
-    """
+    """The chosen fit, and the others that the data do not exclude (`near`)."""
 
     fit: RationalFit
-    tried: dict[tuple[int, int], RationalFit]
-    refused: dict[tuple[int, int], str]
-    near: tuple[RationalFit, ...] = ()
+    near: tuple[RationalFit, ...]
 
 
 def order_of(fit: RationalFit) -> tuple[int, int]:
@@ -88,7 +80,7 @@ def chosen_order(measured: MeasuredResponse, highest: int = HIGHEST) -> ChosenOr
     order = min(near or usable, key=lambda each: (tried[each].parameters, tried[each].criterion))
     possible = [each for each in usable if each != order and not tried[each].misfit]
     close = [each for each in possible if tried[each].criterion <= best + POSSIBLE]
-    return ChosenOrder(tried[order], tried, refused, tuple(tried[each] for each in close))
+    return ChosenOrder(tried[order], tuple(tried[each] for each in close))
 
 
 def with_order(estimate: Estimate, others: Sequence[float]) -> Estimate:

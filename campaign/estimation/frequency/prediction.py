@@ -1,4 +1,4 @@
-"""A fitted response compared with one measured elsewhere, in standard deviations."""
+"""Comparison of a fitted response with an independent measurement, in standard deviations."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ NO_DEVIATION = Cause("no deviation", "too few realisations or averages for a sta
 
 @dataclass(frozen=True)
 class HeldAgainst:
-    """A response that no model was fitted to, and what a model says of it, at n frequencies.
+    """An independent measurement of a response, with the prediction of a model, at n frequencies.
 
     Attributes:
         measured: the response.
-        predicted: of the model, shape (n,).
-        deviation: standard deviation of either part of measured less predicted, shape (n,): scatter
-            of the measurement and of the fit; NaN where the measurement does not tell its own.
-        square: squared difference over its expectation, all frequencies together, with what the
-            fit's own error has in common among them: 1 in the mean for a right model; NaN likewise.
+        predicted: by the model, shape (n,).
+        deviation: standard deviation of either part of measured less predicted, shape (n,), by
+            scatter of measurement and fit; NaN where the scatter of the measurement is unknown.
+        square: squared difference over its expectation, all frequencies together, with the
+            correlation by the fit's error: 1 in the mean for a correct model; NaN likewise.
         most: 3.3 standard deviations of `square` above 1.
-        reason: why there is no deviation; none where there is.
+        reason: why there is no deviation; `NONE` where there is one.
     """
 
     measured: MeasuredResponse
@@ -73,19 +73,19 @@ def held_against(
         covariance: of the parameters, shape (p, p).
     """
     n = len(measured.frequency)
-    left = measured.values - predicted
+    difference = measured.values - predicted
     try:
         weights = Weights.of(measured)
     except ValueError:
-        nothing = np.full(n, math.nan)
-        return HeldAgainst(measured, predicted, nothing, math.nan, math.nan, NO_DEVIATION())
+        unknown = np.full(n, math.nan)
+        return HeldAgainst(measured, predicted, unknown, math.nan, math.nan, NO_DEVIATION())
     stacked = np.concatenate([jacobian.real, jacobian.imag])
     shared = stacked @ covariance @ stacked.T
-    # Estimated variances need this factor, because the mean of their inverse is too large.
+    # A factor for estimated variances, because the mean of their inverse is too large.
     own = np.concatenate([weights.error, weights.error]) ** 2 * weights.mean
-    together = shared + np.diag(own)
-    apart = np.concatenate([left.real, left.imag])
-    square = float(apart @ np.linalg.solve(together, apart)) / (2 * n)
+    whole = shared + np.diag(own)
+    parts = np.concatenate([difference.real, difference.imag])
+    square = float(parts @ np.linalg.solve(whole, parts)) / (2 * n)
     fitted = np.diag(shared)
     deviation = np.sqrt(weights.error**2 + 0.5 * (fitted[:n] + fitted[n:]))
     most = 1.0 + SURE * math.sqrt(n * weights.spread) / weights.mean / (2 * n)

@@ -106,12 +106,15 @@ class RationalFit:
     highest: float
     condition: float = math.nan
 
+    @property
+    def vector(self) -> Array:
+        """Numerator, denominator and delay, shape (p,)."""
+        return np.concatenate([self.numerator, self.denominator, [self.delay]])
+
     def value(self, frequency: Array) -> ComplexArray:
         """G at `frequency` (Hz), shape (n,)."""
-        s = 1j * np.asarray(frequency, dtype=float) / self.scale
-        delayed = np.exp(-s * (2.0 * np.pi * self.scale * self.delay))
-        over = np.polynomial.polynomial.polyval(s, self.denominator)
-        return np.asarray(delayed * np.polynomial.polynomial.polyval(s, self.numerator) / over)
+        s = np.asarray(1j * np.asarray(frequency, dtype=float) / self.scale)
+        return _model(self.vector, s, len(self.numerator) - 1, self.scale)
 
     def log_jacobian(self, frequency: Array) -> ComplexArray:
         """Derivative of log G by (numerator, denominator, delay), shape (n, p)."""
@@ -342,8 +345,3 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
     if alike > SURE and excess > 1.0 + SURE * chance:
         return excess, ALIKE_RESIDUALS(correlation=together)
     return excess, NONE
-
-
-def thinned(measured: MeasuredResponse, every: int) -> MeasuredResponse:
-    """Every n-th point, for windows with correlated neighboring lines (Hann: 2)."""
-    return measured.at(slice(None, None, max(every, 1)))

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -101,7 +100,7 @@ def _or_rigid(
         return found
     ((side, measured),) = responses.items()
     one = rigid_fit(measured, side)
-    rise = found.resonance
+    rise = found.estimates["resonance"]
     seen = rise.origin is Origin.MEASURED and rise.has_interval
     seen = seen and measured.frequency[0] <= rise.value <= measured.frequency[-1]
     better = not seen or one.criterion < found.criterion
@@ -161,12 +160,12 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
     spread *= max(excess, 1.0)
     by = gradients(_numbers, point, np.maximum(1e-4 * np.abs(point), 1e-9))
     rows = zip(UNITS.items(), _numbers(point), propagated(by, spread), strict=True)
-    estimates: dict[str, Any] = {
+    estimates = {
         name: of_fit(name, float(value), unit, float(error), misfit, METHOD)
         for (name, unit), value, error in rows
     }
     return TwoMass(
-        **estimates,
+        estimates,
         misfit=misfit,
         excess=excess,
         criterion=best.cost + len(free) * math.log(2 * n),
@@ -198,9 +197,11 @@ def _numbers(point: Array) -> Array:
 
 def _with_torque(found: TwoMass, uncertainty: float | None) -> TwoMass:
     """Add the relative uncertainty of the torque as a systematic part of all values in N m."""
-    changed: dict[str, Any] = {
+    if uncertainty is None:
+        return found
+    changed = {
         name: shifted_by(each, TORQUE_CONSTANT, abs(each.value) * uncertainty)
-        for name in (*PARTS, "total_inertia")
-        if uncertainty is not None and (each := getattr(found, name)).has_interval
+        for name, each in found.estimates.items()
+        if name in (*PARTS, "total_inertia") and each.has_interval
     }
-    return replace(found, **changed)
+    return replace(found, estimates={**found.estimates, **changed})

@@ -30,6 +30,11 @@ FIRST_LINE = 2
 STRONG = 10.0
 """First-stage F above which a reference excites the input at a line (Staiger, Stock)."""
 
+NO_REFERENCE = (
+    "a closed loop without its reference: output over input would be a mixture of the plant and "
+    "its controller; record what comes into the loop from outside"
+)
+
 
 @dataclass(frozen=True)
 class Record:
@@ -52,6 +57,7 @@ class Spectra:
         cross: S_yu, output times the conjugate of the input.
         of_reference: S_rr, S_yr and S_ur where there is a reference.
         averages: effective number of independent segments.
+        segment: length of a segment in samples.
     """
 
     frequency: Array
@@ -60,6 +66,7 @@ class Spectra:
     cross: ComplexArray
     of_reference: tuple[Array, ComplexArray, ComplexArray] | None
     averages: float
+    segment: int
     method: str
 
     @property
@@ -118,9 +125,8 @@ def spectra(records: Sequence[Record], segment: int | None = None) -> Spectra:
         f"{WINDOW} segments of {length / rate:.4g} s, overlap {100 * OVERLAP:.0f} %, "
         f"{weight:.1f} effective averages"
     )
-    return Spectra(
-        frequency, mean(u, u).real, mean(y, y).real, mean(y, u), of_reference, weight, method
-    )
+    autos = mean(u, u).real, mean(y, y).real
+    return Spectra(frequency, *autos, mean(y, u), of_reference, weight, length, method)
 
 
 def _segments(record: Record, shape: Array, step: int, with_reference: bool) -> ComplexArray:
@@ -168,15 +174,11 @@ def welch_response(
     Raises ValueError for a loop without its reference, and as `spectra` does.
     """
     if excited == "reference" and any(record.reference is None for record in records):
-        raise ValueError(
-            "a closed loop without its reference: output over input would be a mixture of the "
-            "plant and its controller; record what comes into the loop from outside"
-        )
+        raise ValueError(NO_REFERENCE)
     whole = spectra(records, segment)
-    length = segment or _length(whole, records[0].rate)
     response = _of_spectra(whole, excited, estimator)
-    if length // 2 >= 8:
-        half = _of_spectra(spectra(records, length // 2), excited, estimator)
+    if whole.segment // 2 >= 8:
+        half = _of_spectra(spectra(records, whole.segment // 2), excited, estimator)
         response = _with_bias(response, half)
     if excited == "input" or whole.of_reference is None:
         return response
@@ -184,10 +186,6 @@ def welch_response(
     alike = _coherence(of_input, whole.of_reference[0], whole.input_)
     strength = (whole.averages - 1.0) * alike / np.maximum(1.0 - alike, 1e-300)
     return response.at(strength > STRONG)
-
-
-def _length(whole: Spectra, rate: float) -> int:
-    return round(FIRST_LINE * rate / float(whole.frequency[0]))
 
 
 def _of_spectra(whole: Spectra, excited: Excited, estimator: Estimator) -> MeasuredResponse:

@@ -1,1 +1,1 @@
-"""Inverse dynamics: what drives a motion as a sum of what the motion asks for, by regression."""
+"""Inverse dynamics: drive force as a sum of terms of the motion, by regression."""

@@ -71,7 +71,7 @@ def _in_band(motions: Sequence[Motion], terms: Terms, filtering: FilterSettings)
     forces = [late_force(each, filtering) for each in motions]
 
     def left(delay: float) -> float:
-        force = np.concatenate([each.at(delay) for each in forces]) * moves
+        force = np.concatenate([each(delay) for each in forces]) * moves
         rest = force - basis @ (basis.T @ force)
         return float(rest @ rest)
 

@@ -7,7 +7,7 @@ for industrial robot identification", IEEE Trans. Control Syst. Technol. 22 (201
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Self
@@ -26,8 +26,6 @@ REGRESSION_RATE = 100.0
 """Default rate after decimation (Hz), approximately."""
 FASTER = (2.0, 5.0)
 """Multiples of the slowest rate, below which rows are omitted to see the effect of slow sliding."""
-SHORTEST = 8
-"""Fewest decimated samples of a usable piece of a motion."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class Motion:
     @property
     def sample_rate(self) -> float:
         """Sample rate (Hz)."""
-        return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+        return sample_rate_of(self.time)
 
     def part(self, which: slice) -> Motion:
         """Consecutive samples of the motion."""
@@ -164,8 +162,6 @@ def first_kept(count: int, factor: int) -> int:
 def kept_times(motion: Motion, filtering: FilterSettings) -> Array:
     """Times (s) of the decimated rows of a motion."""
     time = motion.time[filtering.skip :]
-    if filtering.decimation == 1:
-        return time
     return time[first_kept(len(time), filtering.decimation) :: filtering.decimation]
 
 
@@ -193,29 +189,25 @@ def _decimator(factor: int) -> Array:
     return np.asarray(cheby1(DECIMATOR_ORDER, ripple, band, output="sos"))
 
 
-class LateRows:
-    """Decimated rows of a signal for many delays.
+def late_rows(
+    samples: Array, sample_rate: float, filtering: FilterSettings
+) -> Callable[[float], Array]:
+    """Decimated rows of a signal, shape (n,), as a function of its delay (s).
 
     Delay and low-pass commute: the signal is filtered once, and a delay needs only an
     interpolation. At the ends the rows differ from `decimated(later(...))`.
     """
+    from scipy.interpolate import CubicSpline
 
-    def __init__(self, samples: Array, sample_rate: float, filtering: FilterSettings) -> None:
-        """samples: shape (n,), evenly spaced."""
-        from scipy.interpolate import CubicSpline
+    smooth = _smooth(samples[filtering.skip :, None], filtering.decimation)[:, 0]
+    place = np.arange(len(smooth), dtype=float)
+    kept = place[first_kept(len(smooth), filtering.decimation) :: filtering.decimation]
+    between = CubicSpline(place, smooth)
 
-        smooth = _smooth(samples[filtering.skip :, None], filtering.decimation)[:, 0]
-        first = first_kept(len(smooth), filtering.decimation)
-        place = np.arange(len(smooth), dtype=float)
-        self._rate = sample_rate
-        self._between = CubicSpline(place, smooth)
-        self._kept = place[first :: filtering.decimation]
-        self._last = place[-1]
+    def rows(delay: float) -> Array:
+        return np.asarray(between(np.clip(kept - delay * sample_rate, 0.0, place[-1])))
 
-    def at(self, delay: float) -> Array:
-        """Rows of the signal with a `delay` (s), shape (rows,)."""
-        wanted = np.clip(self._kept - delay * self._rate, 0.0, self._last)
-        return np.asarray(self._between(wanted))
+    return rows
 
 
 def whole_pieces(good: Flags, fewest: int) -> Sequence[slice]:

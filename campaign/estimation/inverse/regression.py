@@ -53,7 +53,6 @@ class Regression:
             largest of half, rule and twice where they differ (`long_run.safe_deviations`).
         by_bandwidth: at half, rule and twice the bandwidth.
         covariance: robust, shape (k, k), scaled so that its diagonal is `robust` squared.
-        lags: bandwidth of the rule.
         freedom: effective number of rows less coefficients.
         effective: effective number of rows.
         residuals: of each piece, shape (n,); zero in omitted rows.
@@ -69,7 +68,6 @@ class Regression:
     robust: Array
     by_bandwidth: tuple[Deviations, ...]
     covariance: Array
-    lags: float
     freedom: float
     effective: float
     residuals: tuple[Array, ...]
@@ -136,7 +134,6 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
         robust=robust,
         by_bandwidth=tuple(Deviations(lag, sd) for lag, sd in zip(tried, widths, strict=True)),
         covariance=scaled_to(covariances[1], robust),
-        lags=tried[1],
         freedom=effective - k,
         effective=effective,
         residuals=residuals,

@@ -13,10 +13,10 @@ import numpy as np
 from campaign.arrays import Array
 from campaign.estimation.inverse.motion import (
     FilterSettings,
-    LateRows,
     Motion,
     decimated,
     kept_times,
+    late_rows,
 )
 from campaign.estimation.inverse.regression import Piece
 from campaign.estimation.inverse.terms import TERMS, Term, Terms, columns
@@ -42,7 +42,7 @@ def rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float =
 def all_rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float = 0.0) -> Piece:
     """As `rows`, with those at standstill."""
     made = [_column(motion, term, filtering) for term in terms]
-    force = late_force(motion, filtering).at(delay)
+    force = late_force(motion, filtering)(delay)
     return Piece(np.column_stack(made), force, kept_times(motion, filtering))
 
 
@@ -65,12 +65,12 @@ def _column(motion: Motion, term: Term, filtering: FilterSettings) -> Array:
     return _once(motion, (term, filtering.decimation, filtering.skip), make)
 
 
-def late_force(motion: Motion, filtering: FilterSettings) -> LateRows:
-    """Rows of the force, for any delay."""
+def late_force(motion: Motion, filtering: FilterSettings) -> Callable[[float], Array]:
+    """Rows of the force as a function of its delay (s)."""
     return _once(
         motion,
         (filtering.decimation, filtering.skip),
-        lambda: LateRows(motion.force, motion.sample_rate, filtering),
+        lambda: late_rows(motion.force, motion.sample_rate, filtering),
     )
 
 
@@ -107,9 +107,3 @@ def in_blocks(pieces: Sequence[Piece], count: int) -> list[list[slice]]:
 def part(piece: Piece, which: slice) -> Piece:
     """Some rows of a piece."""
     return Piece(piece.columns[which], piece.force[which], piece.time[which])
-
-
-def relative(residuals: Sequence[Array], forces: Sequence[Array]) -> float:
-    """Norm of the residuals over that of the force."""
-    over = sum(float(each @ each) for each in residuals)
-    return float(np.sqrt(over / sum(float(each @ each) for each in forces)))

@@ -28,7 +28,6 @@ class Term:
         unit: of the coefficient (SI, rotary).
         meaning: one sentence.
         column: of shape (n,), from a motion before decimation.
-        bench: key of the coefficient in the bench file, or "".
         family: terms of one family describe the same effect, and a model has at most one of them:
             with two, neither coefficient has a meaning alone.
     """
@@ -38,7 +37,6 @@ class Term:
     unit: str
     meaning: str
     column: Callable[[Motion], Array]
-    bench: str = ""
     family: str = ""
 
 
@@ -61,8 +59,7 @@ def _warmer(motion: Motion) -> Array:
 
 
 ALL = (
-    Term("inertia", "a", "kg m^2", "What resists acceleration.", lambda m: m.acceleration,
-         "axis.inertia"),
+    Term("inertia", "a", "kg m^2", "What resists acceleration.", lambda m: m.acceleration),
     Term("viscous", "v", "N m s/rad", "Friction that grows with the rate.", lambda m: m.rate),
     Term("viscous_positive", "v+", "N m s/rad", "Viscous friction, positive direction.",
          lambda m: m.rate * _positive(m)),

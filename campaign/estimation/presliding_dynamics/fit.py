@@ -41,8 +41,6 @@ FEW = 8
 TOLERANCE = 1e-8
 """Relative change of the sum of squares at which a search ends: for 1e5 samples a thousandth of the
 change by one deviation of a parameter."""
-ROUNDS = 1
-"""Iterations that estimate each channel's deviation from its residuals."""
 
 
 def fit_presliding_dynamics(
@@ -52,10 +50,8 @@ def fit_presliding_dynamics(
 
     Raises ValueError with the reason where there is no start, or no start can be simulated.
     """
-    best = first_fit(records, assumed)
-    for _ in range(ROUNDS):
-        best = search(_reweighted(centred(search(_reweighted(with_doubts(best))))))
-    return with_slopes(best)
+    best = search(_reweighted(with_doubts(first_fit(records, assumed))))
+    return with_slopes(search(_reweighted(centred(best))))
 
 
 def first_fit(records: Sequence[Record], assumed: Assumptions | None = None) -> JointFit:
@@ -230,14 +226,11 @@ def _with_noise(fit: JointFit, whitening: Callable[[Array], Array]) -> JointFit:
             whole = np.convolve(channel.whitening, own)
             seen.setdefault(channel.name, []).append((max(deviation, least), whole))
     noise = {
-        name: sorted(each, key=_deviation)[(len(each) - 1) // 2] for name, each in seen.items()
+        name: sorted(pairs, key=lambda pair: pair[0])[(len(pairs) - 1) // 2]
+        for name, pairs in seen.items()
     }
     channels = tuple(
         tuple(Channel.of(c.name, c.samples, c.kept, *noise[c.name]) for c in group)
         for group in fit.channels
     )
     return replace(fit, channels=channels)
-
-
-def _deviation(noise: tuple[float, Array]) -> float:
-    return noise[0]

@@ -152,10 +152,8 @@ class Parameters:
             return 0.0
         return float(vector[self.names.index(name)]) * self.step
 
-    def in_units(self, vector: Array, name: str) -> tuple[float, float]:
-        """Value of a parameter (SI), and its derivative by the vector."""
-        index = self.names.index(name)
-        value = float(vector[index])
+    def in_units(self, name: str, value: float) -> tuple[float, float]:
+        """Value of a parameter (SI) from that in the vector, and its derivative by the latter."""
         if name in LOGARITHMIC:
             return float(np.exp(value)), float(np.exp(value))
         scale = {

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import (
@@ -23,7 +22,6 @@ from campaign.estimation.intervals import (
 from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics, whitened
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
 from campaign.estimation.presliding_dynamics.parameters import LOGARITHMIC
-from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.estimation.presliding_dynamics.shape import SURELY, Misfit, misfit_of
 from campaign.estimation.presliding_dynamics.uncertainty import (
@@ -83,11 +81,6 @@ class PreslidingDynamics:
     misfit: Misfit
     reason: Reason
 
-    @property
-    def plant(self) -> Plant:
-        """Plant of the best fit."""
-        return self.fit.plant
-
 
 def identify_presliding_dynamics(
     records: Sequence[Record], assumed: Assumptions | None = None
@@ -103,10 +96,10 @@ def identify_presliding_dynamics(
     misfit = misfit_of(plain, fit)
     spread = spread_of(fit)
     reason = _reason(fit, misfit)
+    every = enumerate(fit.parameters.names)
     if reason:
-        estimates = {name: _without(fit, name, reason) for name in fit.parameters.names}
+        estimates = {name: _without(fit, index, reason) for index, name in every}
     else:
-        every = enumerate(fit.parameters.names)
         estimates = {name: _estimate(fit, spread, misfit, index) for index, name in every}
         estimates |= _derived(fit, spread, misfit)
     return PreslidingDynamics(estimates, fit, spread, misfit, reason)
@@ -125,27 +118,28 @@ def _reason(fit: JointFit, misfit: Misfit) -> Reason:
     return MODEL_MISFIT(why=misfit.reason) if misfit.reason else NONE
 
 
-def _without(fit: JointFit, name: str, reason: Reason) -> Estimate:
-    value, _ = fit.parameters.in_units(fit.vector, name)
+def _without(fit: JointFit, index: int, reason: Reason) -> Estimate:
+    name = fit.parameters.names[index]
+    value, _ = fit.parameters.in_units(name, float(fit.vector[index]))
     return Estimate.without_interval(name, value, UNITS[name], reason, method=METHOD)
 
 
 def _estimate(fit: JointFit, spread: Spread, misfit: Misfit, index: int) -> Estimate:
     """Estimate of one shared parameter, with limits along the profile where that is curved."""
-    name = fit.parameters.names[index]
-    value, scale = fit.parameters.in_units(fit.vector, name)
+    name, here = fit.parameters.names[index], float(fit.vector[index])
+    value, scale = fit.parameters.in_units(name, here)
     freedom, deviation = float(spread.freedom[index]), float(spread.deviation[index])
     quantile = student(freedom)
     if name in LOGARITHMIC and quantile * deviation > WIDEST:
-        return replace(_without(fit, name, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
-    ends = [float(fit.vector[index]) + sign * quantile * deviation for sign in (-1.0, 1.0)]
-    size = 1.0 if name in LOGARITHMIC else abs(float(fit.vector[index]))
+        return replace(_without(fit, index, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
+    ends = [here + sign * quantile * deviation for sign in (-1.0, 1.0)]
+    size = 1.0 if name in LOGARITHMIC else abs(here)
     if name in PROFILED and CURVED * size < deviation < size:
         try:
             ends = [profile_end(fit, spread, index, quantile, sign) for sign in (-1.0, 1.0)]
         except ValueError:
-            return replace(_without(fit, name, FLAT_PROFILE()), origin=Origin.NOT_DETERMINED)
-    low, high = (_in_units(fit, name, end) for end in ends)
+            return replace(_without(fit, index, FLAT_PROFILE()), origin=Origin.NOT_DETERMINED)
+    low, high = (fit.parameters.in_units(name, end)[0] for end in ends)
     estimate = Estimate(
         name,
         value,
@@ -164,12 +158,6 @@ def _estimate(fit: JointFit, spread: Spread, misfit: Misfit, index: int) -> Esti
         origin = Origin.AT_BOUND if value <= 0.0 else Origin.NOT_DETERMINED
         return replace(estimate, origin=origin, reason=reason)
     return estimate if name.endswith("delay") or name == "yielding" else admitted(estimate)
-
-
-def _in_units(fit: JointFit, name: str, at: float) -> float:
-    vector: Array = fit.vector.copy()
-    vector[fit.parameters.names.index(name)] = at
-    return fit.parameters.in_units(vector, name)[0]
 
 
 def _shifted(estimate: Estimate, shift: float) -> Estimate:

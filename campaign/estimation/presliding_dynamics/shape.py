@@ -120,14 +120,14 @@ def misfit_of(plain: JointFit, whitened: JointFit) -> Misfit:
 def _misfit_of(fit: JointFit) -> Misfit:
     size = sum(float(np.sum(answer**2)) for answer in _answers(fit))
     places, columns = _band_columns(fit)
-    _, _, chance, explained = _score_test(fit, columns)
+    _, chance, explained = _score_test(fit, columns)
     left = sum(np.einsum("cn,cnk->k", r, c) for r, c in zip(fit.residuals, columns, strict=True))
     power = sum(np.einsum("cnk,cnk->k", c, c) for c in columns)
     pairs = (left / np.maximum(power, np.finfo(float).tiny)).reshape(-1, 2)
     bands = tuple(Band(place, complex(*pair)) for place, pair in zip(places, pairs, strict=True))
     shapes = _shape_columns(fit)
-    _, shift, shape_chance, shape_explained = _score_test(fit, shapes)
-    alone = [_score_test(fit, [each[:, :, [k]] for each in shapes])[3] for k in range(len(SHAPES))]
+    shift, shape_chance, shape_explained = _score_test(fit, shapes)
+    alone = [_score_test(fit, [each[:, :, [k]] for each in shapes])[2] for k in range(len(SHAPES))]
     return Misfit(
         bands,
         float(np.sqrt(explained / size)),
@@ -175,14 +175,15 @@ def _shape_columns(fit: JointFit) -> list[Array]:
     """Change of the simulated answer by each of `SHAPES`, in deviations."""
     plant, changes = fit.plant, []
     bristles = plant.bristles[0]
+    # The same force at every amplitude: otherwise larger records would add no information.
+    force = fit.parameters.torque
+    fastest = max(float(np.max(np.abs(fit.motion(n).rate))) for n in range(len(fit.records)))
     for number, group in enumerate(fit.channels):
         motion = fit.motion(number)
         rate, bent = motion.rate, motion.bristle_torque[:, 0]
         base = fit.answers(number)
         speed = float(np.sqrt(np.mean(rate**2)))
         falling = replace(bristles, coulomb_share=0.7, stribeck_velocity=speed)
-        # The same force at every amplitude: otherwise larger records would add no information.
-        force, fastest = fit.parameters.torque, _fastest(fit)
         forces = (bent**3 / force**2, bent**2 / force, rate * np.abs(rate) * force / fastest**2)
         other = [
             fit.answers(number, replace(plant, bristles=each))
@@ -197,10 +198,6 @@ def _shape_columns(fit: JointFit) -> list[Array]:
         kept = [each if np.all(np.isfinite(each)) else np.zeros_like(each) for each in columns]
         changes.append(np.stack(kept, axis=-1))
     return changes
-
-
-def _fastest(fit: JointFit) -> float:
-    return max(float(np.max(np.abs(fit.motion(n).rate))) for n in range(len(fit.records)))
 
 
 def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
@@ -223,11 +220,11 @@ def _pushed(fit: JointFit, number: int, force: Array) -> Array:
     return with_torque(fit, number, fit.grids[number].torque - more).answers(number)
 
 
-def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, float, float]:
-    """Step to a model with additional columns: of the columns, of the parameters; its p value; sum
-    of squares explained beyond noise.
+def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, float, float]:
+    """Shift of the parameters in a model with additional columns; p value of these columns; sum of
+    squares that they explain beyond noise.
 
-    columns: of each record, shape (channels, n, k). The step of dependent columns is 0.
+    columns: of each record, shape (channels, n, k). Dependent columns have no effect.
     """
     from scipy.special import chdtrc
 
@@ -241,7 +238,7 @@ def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, floa
     own = square - across.T @ onto
     kept = np.diag(own) > ALIKE * np.maximum(np.diag(square), np.finfo(float).tiny)
     if not np.any(kept):
-        return np.zeros(count), np.zeros(size), 1.0, 0.0
+        return np.zeros(size), 1.0, 0.0
     apart = [
         (more - slopes @ onto)[:, :, kept]
         for slopes, more in zip(fit.jacobians, columns, strict=True)
@@ -266,4 +263,4 @@ def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, floa
     step = np.zeros(count)
     step[kept] = inverse @ total
     explained = float(total @ step[kept]) - NOISE * float(np.trace(inverse @ meat))
-    return step, -onto @ step, float(chdtrc(int(np.sum(kept)), statistic)), max(explained, 0.0)
+    return -onto @ step, float(chdtrc(int(np.sum(kept)), statistic)), max(explained, 0.0)

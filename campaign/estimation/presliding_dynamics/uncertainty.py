@@ -35,18 +35,10 @@ class Spread:
     Attributes:
         covariance: shape (k, k).
         freedom: degrees of freedom of each deviation, shape (k,); infinite for scores.
-        ordinary: deviations for independent residuals, shape (k,).
-        by_bandwidth: deviations at half, once and twice the bandwidth, shape (3, k).
-        between: deviation between records over that by scores, shape (k,); NaN for one record.
-        condition: condition number of the information, with columns of length 1.
     """
 
     covariance: Array
     freedom: Array
-    ordinary: Array
-    by_bandwidth: Array
-    between: Array
-    condition: float
 
     @property
     def deviation(self) -> Array:
@@ -74,8 +66,7 @@ def spread_of(fit: JointFit) -> Spread:
     if not np.all(length > 0):
         raise ValueError("a parameter changes nothing in these records")
     scaled = information / np.outer(length, length)
-    condition = float(np.linalg.cond(scaled))
-    if not condition < TELLABLE:
+    if not np.linalg.cond(scaled) < TELLABLE:
         raise ValueError("these records do not separate the parameters of the fit")
     inverse = np.linalg.inv(scaled) / np.outer(length, length)
     count = sum(float(np.sum(c.there)) for group in fit.channels for c in group)
@@ -98,10 +89,9 @@ def spread_of(fit: JointFit) -> Spread:
     # Negatively correlated residuals would result in too small deviations.
     chosen = np.maximum.reduce([safe_deviations(widths), repeated, ordinary])
     covariance = scaled_to(covariances[1], chosen)
-    freedom, between = np.full(shared, np.inf), np.full(shared, np.nan)
     if len(fit.records) > 1:
-        covariance, freedom, between = _with_records(fit, information, covariance)
-    return Spread(covariance, freedom, ordinary, widths, between, condition)
+        return _with_records(fit, information, covariance)
+    return Spread(covariance, np.full(shared, np.inf))
 
 
 def _folded(scores: Array, period: int | None) -> Array:
@@ -113,10 +103,8 @@ def _folded(scores: Array, period: int | None) -> Array:
     return np.asarray(padded.reshape(-1, period, scores.shape[1]).sum(axis=0))
 
 
-def _with_records(
-    fit: JointFit, information: Array, covariance: Array
-) -> tuple[Array, Array, Array]:
-    """Covariance, degrees of freedom, and ratio of the deviations between records to those within.
+def _with_records(fit: JointFit, information: Array, covariance: Array) -> Spread:
+    """Spread with the deviations between records where they exceed those of `covariance`.
 
     The score of each record, reduced by its own parameters, shows its deviation from the shared
     parameters (Liang and Zeger, Biometrika 73, 1986).
@@ -136,11 +124,10 @@ def _with_records(
     inverse = np.linalg.inv(reduced)
     between = np.sqrt(np.diag(inverse @ scatter @ inverse))[: len(fit.parameters.names)]
     within = np.sqrt(np.diag(covariance))
-    ratio = between / within
     limit = float(np.sqrt(chdtri(groups - 1, CHANCE) / (groups - 1)))
-    apart = ratio > limit
+    apart = between / within > limit
     freedom = np.where(apart, groups - 1.0, np.inf)
-    return scaled_to(covariance, np.where(apart, between, within)), freedom, ratio
+    return Spread(scaled_to(covariance, np.where(apart, between, within)), freedom)
 
 
 def profile_end(fit: JointFit, spread: Spread, index: int, quantile: float, way: float) -> float:

@@ -1,1 +1,1 @@
-"""Numbers of a rig over its runs: drifts, jumps, and what of them is declared."""
+"""Drifts and jumps of a rig's numbers over its runs."""

@@ -65,7 +65,6 @@ class Jump:
             the size of a barely significant jump tends to be too large.
         p: p value of no jump at any place.
         places: number of places tried.
-        before, after: the two levels at `place`.
         clearest: size at the place with the smallest uncertainty, for the detectable size.
     """
 
@@ -74,8 +73,6 @@ class Jump:
     size: Mixture
     p: float
     places: int
-    before: Mixture
-    after: Mixture
     clearest: Mixture
 
 
@@ -189,8 +186,6 @@ def _jump(found: Fits, first: int) -> Jump:
         found.averaged(counted),
         float(min(1.0, len(models) * float(np.min(each)))),
         len(models),
-        found.line(0.0, int(models[best])),
-        found.line(1.0, int(models[best])),
         found.mixture(int(models[np.argmin(found.typical_deviation[models])])),
     )
 

@@ -133,17 +133,17 @@ class Fits:
     tau: Array
     rho: Array
 
-    def mixture(self, model: int = 0) -> Mixture:
+    def mixture(self, model: int) -> Mixture:
         """Slope of one model."""
         return Mixture.of(self.log_weight[:, model], self.value[:, model], self.deviation[:, model])
 
-    def line(self, x: float, model: int = 0) -> Mixture:
-        """Value a + b x of one model, without scatter."""
-        far = x - self.pivot[:, model]
+    def line(self, x: float) -> Mixture:
+        """Value a + b x of the first model, without scatter."""
+        far = x - self.pivot[:, 0]
         return Mixture.of(
-            self.log_weight[:, model],
-            self.level + far * self.value[:, model],
-            np.hypot(self.level_deviation, far * self.deviation[:, model]),
+            self.log_weight[:, 0],
+            self.level + far * self.value[:, 0],
+            np.hypot(self.level_deviation, far * self.deviation[:, 0]),
         )
 
     def averaged(self, models: NDArray[np.intp]) -> Mixture:
@@ -166,9 +166,9 @@ class Fits:
         weight = np.exp(self.log_weight - self.log_weight.max(axis=0))
         return np.asarray(np.sum(weight * self.deviation, axis=0) / np.sum(weight, axis=0))
 
-    def expected(self, of: Array, model: int = 0) -> float:
-        """Mean of `tau` or `rho` under one model's weights."""
-        return float(_weights(self.log_weight[:, model]) @ of)
+    def expected(self, of: Array) -> float:
+        """Mean of `tau` or `rho` under the weights of the first model."""
+        return float(_weights(self.log_weight[:, 0]) @ of)
 
 
 def fits(values: Array, columns: Array, own: Array) -> Fits:

@@ -176,7 +176,7 @@ def model_table(fits: Curves, suffix: str, where: str) -> Table:
         {
             "direction": direction,
             "model": MODEL_LABELS[model],
-            "parameters": fit.fits[model].fitted,
+            "parameters": len(fit.fits[model].free),
             "points": len(fit.speed),
             "rms": fit.fits[model].rms,
             "chi_square": fit.fits[model].chi_square,

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field, JsonValue
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
-from campaign.estimation.sampled_curve import LOST, at_sample, bracketed, named, peak
+from campaign.estimation.sampled_curve import LOST, at_sample, bracketed, peak
 from campaign.experiments.interface import Experiment, TestData, TrialData, key, validated
 from campaign.experiments.model_output.figures import (
     UNCHANGED,
@@ -195,7 +196,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
     if np.all(np.isfinite(rate)):
         metrics.append(at_sample("at_amplitude", torque, int(np.argmax(rate)), "N m"))
         metrics += _at_reversal(rate, torque)
-    return simulated(named(each, f"model_{each.name}") for each in metrics)
+    return simulated(replace(each, name=f"model_{each.name}") for each in metrics)
 
 
 def _not_found(name: str) -> Estimate:

@@ -13,8 +13,8 @@ from campaign.arrays import Array
 from campaign.estimation.inverse.motion import FilterSettings, Motion, decimated, first_kept
 from campaign.estimation.inverse.rows import all_rows, late_force, moving
 from campaign.estimation.inverse.terms import TERMS, Term
+from campaign.estimation.objective import Values
 from campaign.estimation.unknowns import Unknown
-from campaign.estimation.whole_model import Values
 from campaign.experiments.shared.friction_models import model_called
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.unknowns import EXPONENT, DerivedOption, FrictionUnknown, Sizes
@@ -147,7 +147,7 @@ class Residuals:
 
     def forces(self, values: Values) -> list[Array]:
         """Rows of the recorded forces at the delay."""
-        return [each.at(values[self._delay]) for each in self._forces]
+        return [each(values[self._delay]) for each in self._forces]
 
     def modelled(self, values: Values) -> list[Array]:
         """Forces of the model."""

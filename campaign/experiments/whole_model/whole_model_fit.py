@@ -254,9 +254,7 @@ def _fitted(
     fit = with_delay(fit, doubt)
     fit = with_bases(described(resolved(fit, model, motions, filtering), model), model)
     say("blocks left out")
-    forces = [
-        late_force(motion, filtering).at(0.0) * moving(motion, filtering) for motion in motions
-    ]
+    forces = [late_force(motion, filtering)(0.0) * moving(motion, filtering) for motion in motions]
     norm = float(np.sqrt(sum(float(each @ each) for each in forces)))
     masks = [_left_out(len(each)) for each in forces]
     unseen = held_out(unknowns, residuals, fit.found.shares, masks)

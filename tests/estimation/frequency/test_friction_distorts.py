@@ -47,7 +47,7 @@ def test_distortion_rises_and_the_response_bends_as_the_excitation_falls() -> No
     assert gains[1][1] < 0.75
     assert gains[1][-1] == pytest.approx(1.0, abs=0.03)  # inertia is all there is up there
     drives = [two_mass({"motor": each.response}) for each in (strong, weak)]
-    assert drives[0].motor_inertia.value == pytest.approx(DRIVE.motor, rel=0.002)
-    assert drives[0].resonance.value == pytest.approx(DRIVE.resonance, rel=0.002)
+    assert drives[0].estimates["motor_inertia"].value == pytest.approx(DRIVE.motor, rel=0.002)
+    assert drives[0].estimates["resonance"].value == pytest.approx(DRIVE.resonance, rel=0.002)
     # The weak one has an interval that holds for its excitation, not for the drive.
-    assert drives[1].motor_inertia.low > DRIVE.motor
+    assert drives[1].estimates["motor_inertia"].low > DRIVE.motor

@@ -169,7 +169,7 @@ def _correlations(told: Masses, parameters: Sequence[Parameter]) -> Mapping[tupl
 
 def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:
     hangs_on_load = dict(told.places) == {"load": "motor"}
-    if told.drive is None or told.drive.misfit:
+    if told.drive is None or told.axis is None or told.drive.misfit:
         few = too_few(best.source)
         reason = few or told.reason
         if told.drive is not None:
@@ -182,7 +182,7 @@ def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:
             yield Parameter(estimate, meaning, unit, key, MORE_PHASES if few else advice)
         return
     keys = {"total_inertia": "axis.inertia", **(APPENDAGE if hangs_on_load else {})}
-    passed = admitted_together({each[0]: getattr(told.axis, each[0]) for each in MEANINGS}, {})
+    passed = admitted_together({each[0]: told.axis.estimates[each[0]] for each in MEANINGS}, {})
     for mode in ("resonance", "antiresonance"):
         if not passed[mode].is_determined:  # nor is the damping of what is not there
             name = f"{mode}_damping"

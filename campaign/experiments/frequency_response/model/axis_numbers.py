@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.distortion import total
@@ -79,14 +78,14 @@ def of_axis(drive: TwoMass, odd: float, weaker: Sequence[Weaker]) -> TwoMass:
     """
     if not odd:
         return drive
-    changed: dict[str, Any] = {}
+    changed = {}
     for name in NUMBERS:
-        one = getattr(drive, name)
+        one = drive.estimates[name]
         if one.has_interval:
             parts = list(_extrapolated(one, name, weaker))
             least = LEAST * BY_RULE.get(name, 0.0) * min(odd, BENT) * abs(one.value)
             changed[name] = with_part(one, max(*parts, least)) if parts else by_rule(one, odd)
-    return replace(drive, **changed)
+    return replace(drive, estimates={**drive.estimates, **changed})
 
 
 def by_rule(one: Estimate, odd: float) -> Estimate:
@@ -113,7 +112,7 @@ def _extrapolated(one: Estimate, name: str, weaker: Sequence[Weaker]) -> Iterato
     uncertainty of the difference is that of both numbers.
     """
     for each in weaker:
-        other = getattr(each.drive, name)
+        other = each.drive.estimates[name]
         if not other.has_interval or one.standard_error is None or other.standard_error is None:
             continue
         apart = math.hypot(other.value - one.value, one.standard_error, other.standard_error)

@@ -267,7 +267,7 @@ def _with_axis(told: Masses, source: Source, others: Sequence[Source], band: Ban
             tried.append(Weaker(_weaker_drive(told, each, band), source.rms / each.rms))
     axis = of_axis(told.drive, odd, tried)
     bent = ""
-    if axis.total_inertia.reason in UNKNOWN or axis.resonance.reason in UNKNOWN:
+    if any(axis.estimates[name].reason in UNKNOWN for name in ("total_inertia", "resonance")):
         bent = (
             f"Odd distortion is {100 * odd:.0f} % of the output: friction distorts the response, "
             "and one amplitude does not determine how much. Repeat it at half or twice the "

@@ -160,7 +160,7 @@ def masses_table(masses: Masses) -> Iterator[Table]:
         "One inertia" if drive.rigid else "Two inertias on a spring",
         (*columns, Column("of", "Of", exact=True)),
         tuple(
-            {**{column.name: getattr(each, column.name) for column in columns}, "of": whose}
+            {**{column.name: each.estimates[column.name] for column in columns}, "of": whose}
             for whose, each in rows.items()
         ),
         note=f"{RIGID_METHOD if drive.rigid else METHOD}.{spring}",
