@@ -24,6 +24,7 @@ from campaign.identify.identification import Identification, Section
 from campaign.parameter import Parameter
 from campaign.physics.compensation.identified import ENDING, identified_name, stated_name
 from campaign.physics.loop import at_load
+from campaign.trial import leaves
 
 DIGITS = 6
 """Significant digits of a number in a bench file."""
@@ -119,7 +120,7 @@ def _add(
     """Add the twin of a compensation: stated values, replaced by its own identified values."""
     twin = f"compensation.{identified_name(name)}"
     replaced = {path.rpartition(".")[0] for path in own if path.endswith(".coulomb_torque")}
-    for path, value in _flat(stated):
+    for path, value in leaves(stated):
         table, _, key = path.rpartition(".")
         if key in (*CURVE, EXPONENT) and table.removesuffix(".negative") in replaced:
             continue  # `own` replaces the whole curve
@@ -130,14 +131,6 @@ def _add(
             entries.known[f"{twin}.{path}"] = known_of(number)
         else:
             entries.values[f"{twin}.{path}"] = number
-
-
-def _flat(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
 
 
 def _of_observer(sections: Sequence[Section]) -> Iterator[tuple[str, Number]]:

@@ -6,11 +6,11 @@ Pages show *lugre* or *stribeck* instead of all parameters, which are in the arc
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from pydantic import JsonValue
 
-from campaign.trial import canonical_json
+from campaign.trial import canonical_json, leaves
 
 KINDS = ("model", "method", "kind")
 """Entries that state the kind of a table; its name begins with the kind."""
@@ -23,21 +23,21 @@ def table_names(values: Sequence[JsonValue]) -> dict[str, str]:
     kind: `lugre`, or `lugre, coulomb_torque = 26`. Numbers are SI, as the tables are.
     """
     tables = {canonical_json(value): value for value in values if isinstance(value, dict)}
-    leaves = {key: dict(_leaves(table)) for key, table in tables.items()}
+    entries = {key: dict(leaves(table)) for key, table in tables.items()}
     names = {}
-    for key, own in leaves.items():
-        like = [other for other in leaves.values() if _kind(other) == _kind(own)]
-        telling = [
+    for key, own in entries.items():
+        like = [other for other in entries.values() if _kind(other) == _kind(own)]
+        differing = [
             path
             for path in own
             if any(path not in other or not _same(other[path], own[path]) for other in like)
         ]
-        words = [f"{path} = {_text(own[path])}" for path in telling]
+        words = [f"{path} = {_text(own[path])}" for path in differing]
         names[key] = ", ".join(([_kind(own)] if _kind(own) else []) + words) or "as given"
-    return _told_apart(names)
+    return _numbered(names)
 
 
-def _told_apart(names: Mapping[str, str]) -> dict[str, str]:
+def _numbered(names: Mapping[str, str]) -> dict[str, str]:
     """Number equal names, where kind and six digits do not distinguish the tables."""
     count = Counter(names.values())
     numbers: Counter[str] = Counter()
@@ -54,15 +54,6 @@ def _same(one: JsonValue, other: JsonValue) -> bool:
 
 def _kind(leaves: Mapping[str, JsonValue]) -> str:
     return next((str(leaves[name]) for name in KINDS if name in leaves), "")
-
-
-def _leaves(table: Mapping[str, JsonValue], prefix: str = "") -> Iterator[tuple[str, JsonValue]]:
-    """Dotted path and value of all entries that are no tables."""
-    for name, value in table.items():
-        if isinstance(value, dict):
-            yield from _leaves(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
 
 
 def _text(value: JsonValue) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from campaign.archive import RunHeader
 from campaign.protocol.matrix import RANGE_KEYS, flatten
 from campaign.protocol.overrides import parse_overrides
+from campaign.trial import leaves
 from campaign.units import split_quantity
 
 Written = Mapping[str, Mapping[str, str]]
@@ -47,7 +48,7 @@ def _tests(text: str) -> Iterator[Mapping[str, Any]]:
 def _units(tree: Mapping[str, Any]) -> dict[str, str]:
     """Unit by dotted path of all values with a unit in a tree; the first unit of a list counts."""
     units: dict[str, str] = {}
-    for path, value in leaves_of(tree):
+    for path, value in leaves(tree):
         for name, unit in _units_of(path, value):
             units.setdefault(name, unit)
     return units
@@ -82,12 +83,3 @@ def _nested(keys: Sequence[str], value: Any) -> dict[str, Any]:
     for key in reversed(keys):
         value = {key: value}
     return value if isinstance(value, dict) else {}
-
-
-def leaves_of(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted path and value of all entries that are no tables."""
-    for name, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from leaves_of(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value

@@ -18,9 +18,10 @@ from campaign.experiments.shared.common import OF_NO_OPTION
 from campaign.physics.bench import Bench
 from campaign.physics.bench_knowledge import number_at
 from campaign.protocol.shapes import Shape, shape_at
-from campaign.report.content.protocol_units import leaves_of, written_units
+from campaign.report.content.protocol_units import written_units
 from campaign.result import Table, is_number
 from campaign.text import capitalized, number, path_words, pretty_unit
+from campaign.trial import leaves
 from campaign.units import Quantity, convert
 
 LISTED = 12
@@ -152,9 +153,9 @@ class TestUnits:
 
     def _tables(self, path: str, values: Sequence[Any]) -> Iterator[str]:
         """Texts of tables: their kind, and the entries that are not equal in all of a kind."""
-        leaves = [dict(leaves_of(v)) if isinstance(v, Mapping) else {"": v} for v in values]
-        for own in leaves:
-            alike = [other for other in leaves if _kind(other) == _kind(own)]
+        tables = [dict(leaves(v)) if isinstance(v, Mapping) else {"": v} for v in values]
+        for own in tables:
+            alike = [other for other in tables if _kind(other) == _kind(own)]
             entries = [
                 f"{path_words(name)} {self.value(f'{path}.{name}', value)}".strip()
                 for name, value in own.items()
