@@ -30,6 +30,8 @@ Style = Literal["line", "points", "line+points", "band", "thin", "loop"]
 
 TOLERANCE = 1e-3
 """Relative tolerance for equal numbers of a condition, relative to the larger."""
+ROUNDING = 1e-9
+"""Relative tolerance between a sweep point and the same number in a finding's conditions."""
 NOTHING = 1e-9
 """Absolute tolerance for equal numbers of a condition (SI): 1e-17 rad equals 0."""
 
@@ -51,6 +53,22 @@ def same_value(one: Value, other: Value) -> bool:
 def meets(stated: Mapping[str, Value], wanted: Mapping[str, Value]) -> bool:
     """Whether the stated conditions include each of the wanted ones, with the same value."""
     return all(name in stated and same_value(stated[name], value) for name, value in wanted.items())
+
+
+def allow(conditions: Mapping[str, Value], point: Mapping[str, Any]) -> bool:
+    """Whether no condition excludes a trial at this point of its matrix.
+
+    Numbers may differ by rounding. Conditions have only the name of a swept table, so that any
+    table may match.
+    """
+    shared = point.keys() & conditions.keys()
+    return all(_is_swept(point[name], conditions[name]) for name in shared)
+
+
+def _is_swept(swept: Any, stated: Value) -> bool:
+    if is_number(swept) and is_number(stated):
+        return math.isclose(swept, stated, rel_tol=ROUNDING)
+    return isinstance(swept, dict) or swept == stated
 
 
 @dataclass(frozen=True)

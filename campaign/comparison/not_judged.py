@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from campaign.api.analysis import AnalysedTest
 from campaign.reason import NONE, Cause, Reason
-from campaign.result import Finding, same_value
+from campaign.result import Finding, allow
 
 DERIVED = frozenset({"error_reduction", "error_decrease", "error_growth", "load_share"})
 """Quantities that are functions of other numbers of the same test."""
@@ -39,11 +39,6 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
 def trials_behind(test: AnalysedTest, finding: Finding) -> int:
     """Count of trials that the finding may use: those that its conditions do not exclude."""
     return sum(
-        archived.is_completed_measurement
-        and all(
-            same_value(finding.conditions[path], value)  # type: ignore[arg-type]
-            for path, value in archived.trial.point.items()
-            if path in finding.conditions
-        )
+        archived.is_completed_measurement and allow(finding.conditions, archived.trial.point)
         for archived in test.trials
     )

@@ -14,7 +14,7 @@ from typing import Any
 from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import STATED, why_altered
 from campaign.published.draws import SEED
-from campaign.result import Value
+from campaign.result import Value, allow
 from campaign.trial import Role, Tree, Trial, canonical_json
 
 BENCH = "bench."
@@ -26,8 +26,6 @@ OF_A_TRUTH = (
 """Reason why a trial that simulates a truth is altered, for any stated bench."""
 DESCRIBED_TWICE = "its trials state different descriptions of their bench"
 """Reason why a test does not have one bench."""
-TOLERANCE = 1e-9
-"""Relative tolerance between a sweep point and the same number in a finding's conditions."""
 
 
 @dataclass(frozen=True)
@@ -172,16 +170,5 @@ def _replaced(tree: Mapping[str, Any], keys: list[str], value: Any) -> dict[str,
 
 
 def _may_be_behind(place: SweepPoint, conditions: Mapping[str, Value]) -> bool:
-    if conditions.get("compensation", place.compensation) != place.compensation:
-        return False
-    shared = place.point.keys() & conditions.keys()
-    return all(_same(place.point[name], conditions[name]) for name in shared)
-
-
-def _same(swept: Any, told: Value) -> bool:
-    if isinstance(swept, bool) or isinstance(told, bool):
-        return swept is told
-    if isinstance(swept, int | float) and isinstance(told, int | float):
-        return abs(swept - told) <= TOLERANCE * max(abs(swept), abs(told))
-    # The conditions contain only the name of a swept table, so that any point may match.
-    return isinstance(swept, dict) or swept == told
+    same = conditions.get("compensation", place.compensation) == place.compensation
+    return same and allow(conditions, place.point)

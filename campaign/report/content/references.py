@@ -28,9 +28,9 @@ from campaign.physics.true_values import QUANTITIES
 from campaign.reason import Cause
 from campaign.references.values import ReferenceValue
 from campaign.references.verdict import JudgedNumber, Verdict, with_verdicts
-from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of, signed
+from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, signed
 from campaign.report.content.written_units import TestUnits
-from campaign.result import Cell, Column, Finding, Table
+from campaign.result import Cell, Column, Finding, Table, allow
 from campaign.text import count, quantity_words
 from campaign.trial import Trial
 from campaign.units import same_dimension
@@ -129,7 +129,7 @@ def _stated(run: RunReader, test: AnalysedTest) -> Found | None:
     known = _to_compare([each for each in findings if each.quantity in QUANTITIES])
     pairs = []
     for finding in known:
-        own = [trial for trial in trials if is_of(trial, finding)]
+        own = [trial for trial in trials if allow(finding.conditions, trial.point)]
         on = _bench(own[0]) if own else None
         if on is None or any(trial.bench != own[0].bench for trial in own[1:]) or why_altered(on):
             continue

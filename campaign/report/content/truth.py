@@ -23,7 +23,7 @@ from campaign.physics.true_values import QUANTITIES, true_of, true_value
 from campaign.physics.truth import simulated
 from campaign.physics.variation import as_it_is, of_its_day
 from campaign.report.content.written_units import TestUnits
-from campaign.result import Cell, Column, Finding, Table, Value
+from campaign.result import Cell, Column, Finding, Table, Value, allow
 from campaign.text import capitalized, number, path_words, quantity_words
 from campaign.trial import Tree, Trial, canonical_json
 
@@ -241,18 +241,9 @@ def _benches_of(
 
     For a finding of one trial, it is that trial's own bench: friction scatters between trials.
     """
-    own = [trial for trial in trials if is_of(trial, finding)]
+    own = [trial for trial in trials if allow(finding.conditions, trial.point)]
     used = [benches.own(own[0])] if len(own) == 1 else [benches.of(trial) for trial in own]
     yield from {id(bench): bench for bench in used}.values()
-
-
-def is_of(trial: Trial, finding: Finding) -> bool:
-    """Whether the trial's sweep point does not contradict the finding's conditions."""
-    return all(
-        finding.conditions[path] == value
-        for path, value in trial.point.items()
-        if path in finding.conditions
-    )
 
 
 def conditions_text(conditions: Mapping[str, Value], units: TestUnits) -> str:
