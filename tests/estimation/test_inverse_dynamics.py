@@ -21,6 +21,7 @@ from campaign.estimation.inverse.motion import (
     whole_pieces,
 )
 from campaign.estimation.inverse.position_period import find_period
+from campaign.estimation.inverse.presliding_share import deflection
 from campaign.estimation.inverse.regression import (
     Piece,
     effective_count,
@@ -464,3 +465,15 @@ def test_intervals_hold_on_rigs_of_all_sizes(count: int) -> None:
     assert set(held) == set(DIRECTIONAL)
     together = [each for own in held.values() for each in own]
     assert rejected({**held, "together": together}, "less") == {}
+
+
+def test_bristles_build_up_and_reverse_as_in_closed_form() -> None:
+    """1 - exp(-q / reach) from rest; after a reversal to the other side from where they are."""
+    up, down = np.linspace(0.0, 3.0, 31), np.linspace(3.0, 1.0, 21)
+    state = deflection(np.concatenate([up, up[-1:], down]), 0.7)
+    first = -np.expm1(-up / 0.7)
+    assert state == pytest.approx(
+        np.concatenate([first, first[-1:], -1.0 + (1.0 + first[-1]) * np.exp((down - 3.0) / 0.7)])
+    )
+    assert deflection(-up, 0.7) == pytest.approx(-first)
+    assert not deflection(np.zeros(5), 0.7).any()

@@ -12,11 +12,13 @@ from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE, TEMPE
 from campaign.estimate import Origin
 from campaign.estimation import gate
 from campaign.estimation.inverse.motion import FilterSettings
+from campaign.estimation.inverse.presliding_share import HARDLY_SLIDES
 from campaign.experiments.any_motion.motions import moved
 from campaign.experiments.friction_map import steady_recordings
 from campaign.experiments.friction_map.stretches import points_of, slower
 from campaign.parameter import IdentifiedRig
 from campaign.trial import Channel, Recording
+from tests.estimation.coverage import holds
 from tests.experiments.asked import asked
 
 RATE = 1000.0
@@ -175,3 +177,47 @@ def test_trials_and_slow_strokes_that_are_not_in_a_map_are_reasons() -> None:
     assert dict(without.values) == {"count": 1, "total": 2, "numbers": "2"}
     assert slow in steady_recordings.TOO_SLOW
     assert dict(slow.values) == {"count": 4}
+
+
+def on_bristles(reach: float) -> np.ndarray:
+    """Torque of 2 kg m^2 on bristles of 30 N m, damped by 30 N m s/rad, in Dahl's model."""
+    rate = np.gradient(SWING, TIME)
+    state = np.zeros_like(TIME)
+    for k, step in enumerate(np.diff(SWING)):
+        state[k + 1] = np.sign(step) + (state[k] - np.sign(step)) * np.exp(-abs(step) / reach)
+    force = 2.0 * np.gradient(rate, TIME) + 30.0 * state + 30.0 * reach * np.gradient(state, TIME)
+    return np.asarray(force + 0.02 * NOISE[0])
+
+
+@pytest.mark.parametrize("model", ["inverse_dynamics", "whole_model"])
+def test_friction_of_an_axis_that_hardly_slides_is_not_determined(model: str) -> None:
+    """Damping of its bristles is no viscous friction of sliding, which it does not have."""
+    options: dict[str, Any] = {"models": ("stribeck",), "starts": 1}
+    trials = [driven(SWING[:8000], on_bristles(0.5)[:8000])]
+    found = asked(model, trials, **(options if model == "whole_model" else {})).identified
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    friction = [one for name, one in told.items() if name.startswith(("coulomb", "viscous"))]
+    assert friction
+    for one in friction:
+        assert one.origin is Origin.NOT_DETERMINED
+        assert one.reason in HARDLY_SLIDES
+        assert dict(one.reason.values)["percent"] < 50.0
+        assert dict(one.reason.values)["reach"] == pytest.approx(0.5, rel=0.5)
+    assert holds(told["inertia"], 2.0)
+    assert not any(each.bench.startswith("friction") for each in found.parameters if each.bench)
+
+
+def test_friction_of_an_axis_that_slides_is_determined() -> None:
+    found = identified(SWING, on_bristles(1e-4))
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    assert holds(told["coulomb_positive"], 30.0)
+    assert not any(one.reason in HARDLY_SLIDES for one in told.values())
+
+
+def test_an_axis_without_dry_friction_has_viscous_friction() -> None:
+    """Noise may prefer bristles to none, of no size."""
+    rate = np.gradient(SWING, TIME)
+    force = 0.2 * np.gradient(rate, TIME) + 5.0 * rate + 0.05 * NOISE[0]
+    told = {each.estimate.name: each.estimate for each in identified(SWING, force).parameters}
+    for name in ("viscous_positive", "viscous_negative"):
+        assert holds(told[name], 5.0)

@@ -10,10 +10,12 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.intervals import shifted_by
 from campaign.estimation.inverse.coefficients import estimates, shifts
 from campaign.estimation.inverse.delay import find_delay
 from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.position_period import find_period
+from campaign.estimation.inverse.presliding_share import HARDLY_SLIDES, Presliding, presliding
 from campaign.estimation.inverse.regression import Regression
 from campaign.estimation.inverse.rows import all_rows, rows
 from campaign.estimation.inverse.simulation import relative_rate_error
@@ -46,6 +48,8 @@ BENDS = Cause(
     "friction is nonlinear over these rates: it is one share of a sum, without own meaning",
 )
 STATED = Cause("stated", "stated")
+PRESLIDING = "presliding"
+"""Systematic part of bristles that an axis hardly leaves."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,7 @@ class InverseDynamics:
         biased: whether least squares differ from instruments by more than their scatter; then
             `estimates` are those of instruments.
         period: period over position that was tried; None without one.
+        bristles: their fit if the axis hardly slides, else None.
     """
 
     pieces: tuple[MotionPiece, ...]
@@ -98,6 +103,7 @@ class InverseDynamics:
     no_instruments: str
     biased: bool
     period: float | None
+    bristles: Presliding | None
 
     @property
     def best(self) -> CandidateFit:
@@ -179,10 +185,16 @@ def find(
     estimates, biased = held_against(squares, held)
     if terms is None:
         estimates = _without_shares(estimates, best.structure.terms)
+    late = judged_delay(late, held)
+    found = presliding(motions, best.structure, filtering, best.delay, stated=delay is not None)
+    if found is not None:
+        estimates = {name: in_presliding(one, found) for name, one in estimates.items()}
+        if delay is None:
+            late = shifted_by(late, PRESLIDING, abs(best.delay))
     return InverseDynamics(
         tuple(pieces),
         filtering,
-        judged_delay(late, held),
+        late,
         tuple(tried),
         picked,
         squares,
@@ -190,7 +202,23 @@ def find(
         held,
         why,
         biased,
-        period,
+        None if found is not None else period,
+        found,
+    )
+
+
+def in_presliding(one: Estimate, found: Presliding) -> Estimate:
+    """Estimate of an axis that hardly slides.
+
+    Friction, and what bristles have in place of it, is not determined. Other numbers have their
+    difference to those beside bristles as a systematic part.
+    """
+    if one.name in found.values and not one.name.startswith("viscous"):
+        far = abs(found.values[one.name] - one.value)
+        return shifted_by(one, PRESLIDING, far) if one.has_interval else one
+    reason = HARDLY_SLIDES(percent=100.0 * found.share, reach=found.reach)
+    return Estimate.without_interval(
+        one.name, one.value, one.unit, reason, method=one.method, origin=Origin.NOT_DETERMINED
     )
 
 

@@ -16,6 +16,7 @@ from pydantic import AfterValidator, Field
 from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted_together, refused
+from campaign.estimation.inverse.presliding_share import HARDLY_SLIDES
 from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.any_motion.figures import figures
 from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find, repeats
@@ -141,7 +142,9 @@ def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
         bench = BENCH.get(term.name, "") if slides or term.name == "inertia" else ""
         needs = "viscous" if one.reason in NO_SLOPE else term.name
         advice = next((text for key, text in ADVICE.items() if needs.startswith(key)), "")
-        if term.name in together:
+        if one.reason in HARDLY_SLIDES:
+            advice = "raise the force, or move slower and further, until the axis slides"
+        elif term.name in together:
             other, share = together[term.name]
             advice = (
                 f"the motion hardly separates it from {other} (correlation {share:.2f}): {advice}"

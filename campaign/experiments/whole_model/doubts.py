@@ -12,7 +12,9 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import USELESS
 from campaign.estimation.intervals import LEVEL, shifted_by
 from campaign.estimation.inverse.motion import FilterSettings, Motion
+from campaign.estimation.inverse.presliding_share import Presliding
 from campaign.estimation.whole_model import METHOD, ModelFit, moved_with
+from campaign.experiments.any_motion.inverse_fit import in_presliding
 from campaign.experiments.whole_model.residuals import Model
 from campaign.physics.friction.unknowns import DerivedOption
 from campaign.reason import Cause, Reason
@@ -103,6 +105,21 @@ def without_loop(fit: ModelFit) -> ModelFit:
     delay = fit.estimates["delay"]
     opened = Estimate.without_interval("delay", delay.value, "s", LOOP_IN_DELAY(), method=METHOD)
     return replace(fit, estimates={**fit.estimates, "delay": opened})
+
+
+def with_presliding(fit: ModelFit, model: Model, found: Presliding | None) -> ModelFit:
+    """Mark friction of an axis that hardly slides as not determined.
+
+    Numbers of reversals remain: they act in presliding, or rest on friction of sliding.
+    """
+    if found is None:
+        return fit
+    kept = {"delay", *(each.name for each in model.numbers if each.lasts is not None)}
+    estimates = {
+        name: one if name in kept else in_presliding(one, found)
+        for name, one in fit.estimates.items()
+    }
+    return replace(fit, estimates=estimates)
 
 
 def with_bases(fit: ModelFit, model: Model) -> ModelFit:

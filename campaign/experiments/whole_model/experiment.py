@@ -86,7 +86,7 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
     known = held.delay if held is not None and held.of_wanted else None
     found = find(
         pieces, unseen, filtering, extra, options.starts, data.say, known=known,
-        names=options.models, wanted=options.model,
+        bristles=regression.bristles, names=options.models, wanted=options.model,
     )  # fmt: skip
     best = found.fits[found.best]
     parameters = tuple(_parameters(best, data))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
 from campaign.estimation.inverse.motion import FilterSettings, Motion, kept_times
+from campaign.estimation.inverse.presliding_share import Presliding
 from campaign.estimation.inverse.rows import late_force, moving
 from campaign.estimation.inverse.structure_choice import criterion, structure
 from campaign.estimation.inverse.terms import DIRECTIONAL, TERMS, Term
@@ -36,6 +37,7 @@ from campaign.experiments.whole_model.doubts import (
     shifted,
     with_bases,
     with_delay,
+    with_presliding,
     without_loop,
 )
 from campaign.experiments.whole_model.residuals import (
@@ -146,12 +148,14 @@ def find(
     say: Callable[[str], None] = no_progress,
     *,
     known: Estimate | None = None,
+    bristles: Presliding | None = None,
     names: Sequence[str] = USUAL,
     wanted: str = "",
 ) -> Whole:
     """Fit every model, and the best one with its exponent free, too.
 
     known: delay (s) from instruments along the wanted motion; None without any.
+    bristles: their fit if the axis hardly slides, else None.
     names: of the friction models. wanted: name of a model to use instead of the best.
 
     Raises ValueError if the motion does not slide in both directions, for an unknown friction model
@@ -166,7 +170,7 @@ def find(
         done = partial(say_at, say, f"model {len(fits) + 1} of {len(tried) + 1} ({model.name})")
         alike = "alike" in model.name
         terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
-        one = _fitted(model, terms, motions, filtering, inertia, starts, done, known)
+        one = _fitted(model, terms, motions, filtering, inertia, starts, done, known, bristles)
         if unseen:
             one = _validated(one, fits[0] if fits else None, unseen, filtering)
         fits.append(one)
@@ -213,6 +217,7 @@ def _fitted(
     starts: int,
     say: Callable[[str], None],
     known: Estimate | None,
+    bristles: Presliding | None,
 ) -> Fit:
     rate = motions[0].sample_rate
     force = max(float(np.abs(motion.force).max()) for motion in motions)
@@ -251,7 +256,7 @@ def _fitted(
         begin = np.append(fit.found.shares, exponent.share(EXPONENT.start))
         other = refitted((*unknowns, exponent), more, begin)
         fit = shifted(fit, dict(zip(names, other, strict=False)), "exponent", OTHER_EXPONENT)
-    fit = with_delay(fit, doubt)
+    fit = with_presliding(with_delay(fit, doubt), model, bristles)
     fit = with_bases(described(resolved(fit, model, motions, filtering), model), model)
     say("blocks left out")
     forces = [late_force(motion, filtering)(0.0) * moving(motion, filtering) for motion in motions]
