@@ -20,14 +20,11 @@ from typing import Any
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
-from numpy.typing import NDArray
 
 from campaign.archive.layout.files import sha256_of_part, why
 from campaign.archive.layout.storage import CHECKSUM, SAMPLE
 from campaign.archive.reading.global_heap_check import heaps_are_sound
 from campaign.errors import ArchiveError
-
-Array = NDArray[np.float64]
 
 _ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 _LARGEST_ATTRIBUTE = 1 << 16  # bytes

@@ -34,8 +34,7 @@ from campaign.archive.layout.storage import (
     storable,
 )
 from campaign.archive.writing.long_text import SHORT, LongText
-
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 _MEMORY_FILES = itertools.count(1)
 _STRING = h5py.string_dtype()

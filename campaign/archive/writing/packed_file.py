@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.archive.layout.checksums import SeriesDigest
 from campaign.archive.layout.files import keep_umask
@@ -20,8 +19,7 @@ from campaign.archive.layout.packed_trial import (
     Place,
 )
 from campaign.archive.layout.storage import CHUNK, SAMPLE, pack, shuffling_helps
-
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 
 class PackedFile:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 PREVIEW_POINTS = 20_000
 """Largest number of points of a preview: viewers in a browser are slow above about 100 000."""

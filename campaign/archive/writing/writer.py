@@ -153,7 +153,7 @@ class RunWriter:
         """
         attempt, note = self.attempt(trial), self.note
         not_kept = keeping.rule(trial, attempt)
-        writer = TrialWriter.open(self._folder, trial, attempt, note, self.timing, not_kept)
+        writer = TrialWriter(self._folder, trial, attempt, note, self.timing, not_kept)
         with self._lock:
             self._writers = [w for w in self._writers if w.is_open] + [writer]
         return writer
