@@ -276,14 +276,7 @@ class DaskExecutor:
             part = self._writer.folder / next(iter(outcome.files), "trial")
             future.set_exception(lost_trial(part, error, count=len(outcome.files)))
             return
-        trials = {trial.number: trial for trial in batch}
-        for number, executed, entries in outcome.ended:
-            on_end(trials[number], executed, entries)
-        self._timing.add_worker(outcome.spent)
-        if outcome.error is None:
-            future.set_result(None)
-        else:
-            future.set_exception(outcome.error)
+        outcome.report(batch, on_end, self._timing, future)
 
     def _fail(self, future: Future[None], result: Any) -> None:
         """Pass on the error of the worker, or WorkerLostError if worker or scheduler is lost."""

@@ -34,7 +34,7 @@ from campaign.execution.trial_metrics import TrialMeasurement
 from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
 from campaign.policy import SampleRetention
-from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
+from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Timing, Work
 from campaign.trial import Trial
 
 FORGOTTEN = 5.0
@@ -188,6 +188,19 @@ class BatchResult:
     spent: Mapping[Work, Spent]
     files: Mapping[str, bytes] = field(default_factory=dict)
 
+    def report(
+        self, batch: Sequence[Trial], on_end: OnEnd, timing: Timing, future: Future[None]
+    ) -> None:
+        """Report its trials to `on_end`, then the end of the batch to `future`."""
+        trials = {trial.number: trial for trial in batch}
+        for number, executed, entries in self.ended:
+            on_end(trials[number], executed, entries)
+        timing.add_worker(self.spent)
+        if self.error is None:
+            future.set_result(None)
+        else:
+            future.set_exception(self.error)
+
 
 class BatchWorker:
     """Executes batches in a process without the run's journal."""
@@ -324,14 +337,7 @@ class ProcessExecutor:
             return
         if self._pending.pop(future, None) is None:  # already treated as lost
             return
-        trials = {trial.number: trial for trial in batch}
-        for number, executed, entries in returned.ended:
-            on_end(trials[number], executed, entries)
-        self._timing.add_worker(returned.spent)
-        if returned.error is None:
-            future.set_result(None)
-        else:
-            future.set_exception(returned.error)
+        returned.report(batch, on_end, self._timing, future)
 
     def _on_loss(self, pool: ProcessPoolExecutor, future: Future[None]) -> None:
         """The death of one process ends its pool and every batch submitted to it."""

@@ -22,7 +22,7 @@ from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import EarlyEnd, safe_afterwards, unsafe_first
 from campaign.execution.sequence import TrialSequence
-from campaign.execution.stages import Stages, no_stages
+from campaign.execution.stages import Stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
@@ -74,7 +74,8 @@ def run_plan(
     """
     ledger = Ledger(trials, display, finished, computed=isinstance(backend, KnowsCost))
     ended = EarlyEnd(kept=writer.folder)
-    stages, policy = stages or no_stages(), policy or Policy()
+    policy = policy or Policy()
+    stages = stages or Stages((), (), writer, {}, lambda trial: "")
     waiting = stages.in_order(trial for trial in trials if trial.number not in finished)
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
     sequence = TrialSequence(

@@ -12,7 +12,6 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from campaign.archive import ArchivedTrial
 from campaign.archive.layout.followup_trials import trials_followed
@@ -25,6 +24,7 @@ from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.safety import describe
+from campaign.execution.writer import PlanWriter
 from campaign.experiments.interface import (
     Experiment,
     TestData,
@@ -42,16 +42,6 @@ TOLD = 3
 """Number of refused trials per stage that are reported individually; the journal has all."""
 
 
-class StageArchive(Protocol):
-    """Methods of the run's archive that stages use (`campaign.archive.RunWriter`)."""
-
-    def archived(self, number: int) -> TrialData:
-        """A finished trial of this run. Raises ArchiveError, LookupError."""
-
-    def trials_followed(self, followed: TrialsFollowed) -> None:
-        """Journal a stage's trials. Raises ArchiveError."""
-
-
 UNKNOWN = Estimate.without_interval("nothing", math.nan, "", NOTHING_TOLD())
 """Metric of a recording that could not be measured."""
 
@@ -63,7 +53,7 @@ class Stages:
         self,
         planned: Iterable[PlannedStage],
         trials: Sequence[Trial],
-        archive: StageArchive,
+        archive: PlanWriter,
         experiments: Mapping[str, Experiment],
         refusal: Refusal,
         *,
@@ -148,7 +138,7 @@ class Stages:
             reason = describe(error)
         what = (stage.test, stage.number, stage.name, stage.point)
         entry = trials_followed(utc_now(), *what, outcome.trials, outcome.refused, reason)
-        self._archive.trials_followed(entry)
+        self._archive.note(entry)
         self._waiting.popleft()
         self._trials[stage.place] += outcome.trials
         self._next += len(outcome.trials)
@@ -227,18 +217,3 @@ def _remarks(entry: TrialsFollowed) -> list[str]:
     if len(entry.refused) > TOLD:
         remarks.append(f"and {len(entry.refused) - TOLD} more trials are refused")
     return remarks
-
-
-class _Nothing:
-    """The archive of a run without stages."""
-
-    def archived(self, number: int) -> TrialData:
-        raise LookupError(number)
-
-    def trials_followed(self, followed: TrialsFollowed) -> None:
-        return None
-
-
-def no_stages() -> Stages:
-    """Stages of a run without later stages."""
-    return Stages((), (), _Nothing(), {}, lambda trial: "")

@@ -10,6 +10,7 @@ from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import Entry
 from campaign.archive.reading.archived_metrics import Measure
 from campaign.estimate import Estimate
+from campaign.experiments.interface import TrialData
 from campaign.policy import KEEP_ALL, SampleRetention
 from campaign.recording import Array, ChannelInfo, Ending, Event, SafeState
 from campaign.trial import Trial
@@ -57,8 +58,14 @@ class PlanWriter(Begins, Protocol):
     def metrics(self) -> Mapping[int, Sequence[Estimate]]:
         """Metrics of the last finished attempt at each trial, by number."""
 
+    def archived(self, number: int) -> TrialData:
+        """A finished trial of this run. Raises ArchiveError, LookupError."""
+
     def note(self, *entries: Entry) -> None:
-        """Journal entries of trials that other processes have written. Raises ArchiveError."""
+        """Journal a stage, or entries of trials that other processes have written.
+
+        Raises ArchiveError.
+        """
 
     def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
         """Journal an action of the run outside its plan. Raises ArchiveError."""

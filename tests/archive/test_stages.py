@@ -25,7 +25,7 @@ def begun(tmp_path, kit):
     writer, _ = kit.begin(tmp_path, 2, [50, 60], tests=STAGED)
     other = kit.trial(4).model_copy(update={"bench": {"name": "its own", "x": 5e-324}})
     further = [kit.trial(3), other]
-    writer.trials_followed(follow(further, refused=[("map [speed=9]", "too fast")]))
+    writer.note(follow(further, refused=[("map [speed=9]", "too fast")]))
     kit.record(writer, kit.trial(3), 70)
     return writer, further
 
@@ -139,7 +139,7 @@ def test_numbers_go_on_after_the_plans(tmp_path, kit):
 
 def test_a_stage_is_told_once(tmp_path, kit):
     writer, _ = begun(tmp_path, kit)
-    writer.trials_followed(follow([kit.trial(5)]))
+    writer.note(follow([kit.trial(5)]))
     (problem,) = verify_run(writer.folder).problems
     assert "names the trials of a stage 2 times" in str(problem)
 

@@ -17,7 +17,6 @@ from campaign.archive.layout.journal import (
     RunResumed,
     TrialFinished,
     TrialMeasured,
-    TrialsFollowed,
     utc_now,
 )
 from campaign.archive.reading.archived_metrics import with_metrics
@@ -169,10 +168,6 @@ class RunWriter:
     ) -> None:
         """Note a decision outside the plan; `at` is by default the present time."""
         self.note(Decision(at=at or utc_now(), trial=trial, decision=decision, reason=reason))
-
-    def trials_followed(self, followed: TrialsFollowed) -> None:
-        """Note the trials of a stage, before the first of them begins."""
-        self.note(followed)
 
     def archived(self, number: int) -> ArchivedTrial:
         """The last finished attempt at a trial of this run, read from its file, with its metrics.
