@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +12,7 @@ from campaign.archive.layout.files import sha256_of, why
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
-from campaign.archive.layout.journal_summary import Lines, read_lines
+from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.lazy_trials import LazyTrials, Outline
@@ -23,8 +23,11 @@ from campaign.trial import Tree, Trial
 
 @dataclass(frozen=True)
 class Glance:
-    """Facts of a sealed run for `campaign list`. `planned`, `finished` and `failed` count trials,
-    follow-up trials included; `failed` excludes `interrupted` trials, which an operator stopped.
+    """Facts of a run for `campaign list`; counts of trials include follow-up trials.
+
+    Attributes:
+        failed: excludes `interrupted` trials, which an operator stopped.
+        untold: see `RunSummary`.
     """
 
     header: RunHeader
@@ -34,13 +37,7 @@ class Glance:
     finished: int
     failed: int
     interrupted: int
-
-
-def interrupted_trials(status: RunStatus, journal: Callable[[], bytes]) -> int:
-    """Number of stopped trials of a sealed run; reads the journal only if `status` allows any."""
-    if status not in (RunStatus.INTERRUPTED, RunStatus.FAULT):
-        return 0  # the plan was completed
-    return read_lines(journal()).interrupted
+    untold: int = 0
 
 
 @dataclass(frozen=True)

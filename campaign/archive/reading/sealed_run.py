@@ -30,7 +30,7 @@ from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.lazy_trials import LazyTrials, Outline
 from campaign.archive.reading.packed_trial_reader import packed_record, parse_record
 from campaign.archive.reading.provenance import read_provenance
-from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
+from campaign.archive.reading.run_reader import Glance, RunReader
 from campaign.archive.reading.seal import SEAL, SealedTexts
 from campaign.errors import ArchiveError
 from campaign.gc_threshold import paused_collection
@@ -89,7 +89,9 @@ def read_glance(path: Path) -> Glance:
         texts = SealedTexts(path, file, damaged)
         header = _header(texts, damaged)
         status = RunStatus(texts.text("outcome/status"))
-        interrupted = interrupted_trials(status, lambda: texts.raw("journal/data"))
+        interrupted = 0
+        if status in (RunStatus.INTERRUPTED, RunStatus.FAULT):  # else the plan was completed
+            interrupted = read_lines(texts.raw("journal/data")).interrupted
         return Glance(
             header=header,
             planned=header.trials + _followed(texts, header),
