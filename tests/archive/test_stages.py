@@ -43,7 +43,7 @@ def test_they_are_trials_of_the_run_for_every_reader(tmp_path, kit):
         assert [trial.fingerprint for trial in run.plan[2:]] == [t.fingerprint for t in further]
         assert run.header.trials == 2
         assert [run.planned(3), run.planned(4)] == further
-        assert [trial.number for trial in run.full_plan.trials()] == [1, 2, 3, 4]
+        assert len(run.full_plan) == 4
         assert [trial.trial.number for trial in run.trials_of("map")] == [1, 2, 3]
         (stage,) = run.stages
         assert (stage.stage, stage.name, stage.refused[0].why) == (2, "refinement", "too fast")

@@ -16,9 +16,10 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import Field, JsonValue
 
 from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.header import ArchivedModel
 from campaign.estimate import Estimate, Window
 from campaign.recording import ChannelInfo, Ending, Fault, Outcome, SafeState
 from campaign.trial import Tree, Trial, canonical_json, tree_text
@@ -35,13 +36,7 @@ _DETERMINING_WHERE_THERE = ("truth", "recording")
 """Fields of a trial that form its fingerprint; the latter only if they are not empty."""
 
 
-class _Part(BaseModel):
-    """Frozen, and tolerant of fields that a later program added."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-
-class SeriesRecord(_Part):
+class SeriesRecord(ArchivedModel):
     """A recorded channel: its description, and the digest of its samples."""
 
     name: str
@@ -63,7 +58,7 @@ class SeriesRecord(_Part):
         )
 
 
-class PreviewRecord(_Part):
+class PreviewRecord(ArchivedModel):
     """The digests of a long recording's preview: its times, and one channel."""
 
     channel: str
@@ -72,14 +67,14 @@ class PreviewRecord(_Part):
     values: str
 
 
-class EventRecord(_Part):
+class EventRecord(ArchivedModel):
     """An event, at the time of the trial (s)."""
 
     time: float
     text: str
 
 
-class TrialRecord(_Part):
+class TrialRecord(ArchivedModel):
     """An executed trial.
 
     Attributes:

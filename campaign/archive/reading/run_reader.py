@@ -157,16 +157,6 @@ class RunReader:
         """
         return self.full_plan.trial(number)
 
-    def unchanged(self) -> bool:
-        """Whether every byte of the sealed file is as written (reads the whole file)."""
-        from campaign.archive.reading import safe_hdf5
-
-        if not self.sealed:
-            return False
-        with safe_hdf5.open_file(self.path) as file:
-            digest, place = safe_hdf5.digest_at(file, "run/outcome/file_sha256")
-        return digest == sha256_of(self.path, place)
-
     def problems(self) -> list[str]:
         """Damage of the run, samples included (reads all of them, in constant memory)."""
         known = [f"{self.path}: {damage}" for damage in self.damaged]

@@ -13,7 +13,7 @@ from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal import RunStarted, TrialFinished, TrialMeasured
 from campaign.archive.layout.journal_summary import Lines
-from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.layout.record import TrialRecord
 from campaign.archive.reading.damage import DamageList
 from campaign.errors import ArchiveError
 from campaign.trial import Trial, canonical_json
@@ -27,11 +27,9 @@ class TrialFacts:
     """Facts of an archived trial that are compared, without bench and samples.
 
     Attributes:
-        entry: its name in a sealed run, e.g. `trial_00017_attempt_1`.
-        place: its path, for messages.
+        place: path of the trial, for messages.
     """
 
-    entry: str
     place: str
     number: int
     test: str
@@ -43,19 +41,17 @@ class TrialFacts:
     safe_state: str
 
     @classmethod
-    def of(cls, entry: str, place: str, archived: ArchivedTrial, fingerprint: str) -> TrialFacts:
-        trial, ending = archived.trial, archived.ending
+    def of(cls, place: str, record: TrialRecord, fingerprint: str) -> TrialFacts:
         return cls(
-            entry=entry,
             place=place,
-            number=trial.number,
-            test=trial.test,
-            kind=trial.kind,
-            role=trial.role,
+            number=record.number,
+            test=str(record.trial["test"]),
+            kind=str(record.trial["kind"]),
+            role=str(record.trial.get("role", "measurement")),
             fingerprint=fingerprint,
-            outcome=ending.outcome,
-            reason=ending.reason,
-            safe_state=ending.safe_state,
+            outcome=record.outcome,
+            reason=record.reason,
+            safe_state=record.safe_state,
         )
 
 

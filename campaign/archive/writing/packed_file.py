@@ -104,11 +104,6 @@ class SampleColumns:
         return self._written + self._filled
 
     @property
-    def buffered_bytes(self) -> int:
-        """Size of the chunk buffers (bytes); constant."""
-        return self._buffer.nbytes
-
-    @property
     def series(self) -> tuple[PackedSeries, ...]:
         """Places of the samples; complete after `finish`."""
         chunk = max(1, min(self._written, self._buffer.shape[1]))

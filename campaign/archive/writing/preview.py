@@ -23,11 +23,6 @@ class Preview:
         self._stretch = 1
         self._extremes = np.empty((4, 0))  # time of minimum, minimum, time of maximum, maximum
 
-    @property
-    def stretch(self) -> int:
-        """Samples per pair of points; 1 while every sample is kept."""
-        return self._stretch
-
     def add(self, time: Array, values: Array) -> None:
         """Add samples, both shape (n,)."""
         new = np.stack((time, values, time, values))

@@ -16,14 +16,15 @@ from campaign.archive.layout.header import PARTIAL, SEALED
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
 
-_OWN = frozenset({HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING})
+OWN_FILES = frozenset({HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING})
+"""Names of the files in the folder of a run, without those of trials."""
 _TRIAL_FILE = re.compile(r"trial-[0-9]{5,10}(-[0-9]{1,6})?\.(?:trial|nxs)")
 
 
 def is_own(name: str) -> bool:
     """Whether `name` is a name of this program's files in the folder of a run."""
     whole = name.removesuffix(PART)
-    return name in _OWN or whole in _OWN or _TRIAL_FILE.fullmatch(whole) is not None
+    return name in OWN_FILES or whole in OWN_FILES or _TRIAL_FILE.fullmatch(whole) is not None
 
 
 def remove_folder(folder: Path) -> list[Path]:

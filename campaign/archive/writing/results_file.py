@@ -32,7 +32,9 @@ from campaign.archive.writing import hdf5
 from campaign.archive.writing.plots import (
     INTERVAL,
     Plot,
+    floats,
     joined,
+    labels,
     names_of,
     parts_of,
     plots_of,
@@ -40,7 +42,7 @@ from campaign.archive.writing.plots import (
 )
 from campaign.archive.writing.result_tables import put_findings, put_table
 from campaign.errors import ArchiveError, UsageError
-from campaign.result import Array, Axis, Curve, Figure, Panel
+from campaign.result import Array, Curve, Figure, Panel
 
 PUBLISHED = "published"
 ARRAYS = "arrays"
@@ -59,19 +61,6 @@ def _refuse_foreign(run: Path) -> None:
         )
 
 
-def write_results(run: Path, found: RunResults) -> Path:
-    """Write the results of the run at `run` beside it, completely or not at all; return their path.
-
-    Replaces older results. Raises UsageError if another file is at that path, ArchiveError if the
-    write fails; the existing file then stays unchanged.
-    """
-    prepared = prepare_results(run, found)
-    try:
-        return prepared.publish()
-    finally:
-        prepared.discard()
-
-
 @dataclass(frozen=True)
 class PreparedResults:
     """Results in a temporary file, not valid until published."""
@@ -80,7 +69,7 @@ class PreparedResults:
     path: Path
 
     def publish(self) -> Path:
-        """Move them to the results path, replacing older ones. Raises as `write_results`."""
+        """Move them to the results path, replacing older ones. Raises as `prepare_results`."""
         try:
             publish(self.part, self.path)
         except OSError as error:
@@ -94,7 +83,11 @@ class PreparedResults:
 
 
 def prepare_results(run: Path, found: RunResults) -> PreparedResults:
-    """Write results without replacing any; raises as `write_results`. The caller discards them."""
+    """Write the results of the run at `run`, without replacing any. The caller discards them.
+
+    Raises UsageError if another file is at the results path, ArchiveError if the write fails; the
+    existing file stays unchanged.
+    """
     _refuse_foreign(run)
     path = results_path(run)
     prepared = PreparedResults(path.with_name(f".{path.name}.{os.getpid()}{PART}"), path)
@@ -163,7 +156,7 @@ class _Writer:
             if id(array) not in self.places:
                 others.append(array)
                 name = f"array_{len(others)}"
-                hdf5.put_series(arrays, name, _floats(array).ravel())
+                hdf5.put_series(arrays, name, floats(array).ravel())
                 self.places[id(array)] = f"{ARRAYS}/{name}"
             return self.places[id(array)]
 
@@ -237,22 +230,22 @@ class _Writer:
         group.attrs[f"{x_name}_indices"] = np.array([0], dtype="<i4")
         _put_scales(group, panel)
         at = "; ".join(f"{place:g}: {name}" for place, name in panel.x.places)
-        hdf5.put_series(group, x_name, plot.x, **_labels(panel.x, f" ({at})" if at else ""))
+        hdf5.put_series(group, x_name, plot.x, **labels(panel.x, f" ({at})" if at else ""))
         if together is not None:
-            hdf5.put_series(group, whole, together.y, **_labels(panel.y))
+            hdf5.put_series(group, whole, together.y, **labels(panel.y))
             for ending, values, _ in parts_of(together):
                 part = f"{whole}_{ending}"
-                hdf5.put_series(group, part, values, **_labels(panel.y, f", {INTERVAL[ending]}"))
+                hdf5.put_series(group, part, values, **labels(panel.y, f", {INTERVAL[ending]}"))
         for own, curve, start in plot.curves:
             cut = _cut(curve, plot, start)
-            attributes = _labels(panel.y, _which(curve, plot))
-            hdf5.put_series(group, own, plot.spread(_floats(curve.y), start), **attributes)
+            attributes = labels(panel.y, _which(curve, plot))
+            hdf5.put_series(group, own, plot.spread(floats(curve.y), start), **attributes)
             self.places[id(curve.x)] = f"{inside}{name}/{x_name}{cut}"
             self.places[id(curve.y)] = f"{inside}{name}/{own}{cut}"
         for own, curve, start in plot.curves:
             for ending, values, array in parts_of(curve):
                 part = unused(f"{own}_{ending}", group)
-                attributes = _labels(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
+                attributes = labels(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
                 hdf5.put_series(group, part, plot.spread(values, start), **attributes)
                 if array is not None:
                     self.places[id(array)] = f"{inside}{name}/{part}{_cut(curve, plot, start)}"
@@ -301,13 +294,6 @@ def _put_scales(group: h5py.Group, panel: Panel) -> None:
         hdf5.put_attribute(group, "SILX_style", style)
 
 
-def _labels(axis: Axis, more: str = "") -> dict[str, str]:
-    """Attributes of a series along an axis: name, SI unit, unit for display."""
-    unit = f" ({axis.unit})" if axis.unit else ""
-    units = {"units": axis.unit, "display_units": axis.display or axis.unit} if axis.unit else {}
-    return {"long_name": f"{axis.label}{more}{unit}", **units}
-
-
 def _cut(curve: Curve, plot: Plot, start: int) -> str:
     """Slice of the curve in a series over all of x, as text; empty if it is the whole series."""
     length = len(curve.x)
@@ -323,7 +309,3 @@ def _plottable(curve: Curve) -> bool:
     """Whether all arrays have one value per x; other curves (from plug-ins) are only archived."""
     arrays = (curve.x, curve.y, curve.low, curve.high, curve.y_low)
     return all(each is None or np.shape(each) == (len(curve.x),) for each in arrays)
-
-
-def _floats(values: Array) -> Array:
-    return np.asarray(values, dtype=np.float64)
