@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from campaign.archive.layout.files import sha256_of, why
+from campaign.archive.layout.files import read_errors, sha256_of
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
@@ -16,7 +16,6 @@ from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.lazy_trials import LazyTrials, Outline
-from campaign.errors import ArchiveError
 from campaign.recording import SafeState
 from campaign.trial import Tree, Trial
 
@@ -129,10 +128,8 @@ class RunReader:
         Raises ArchiveError.
         """
         path = self.path if self.sealed else self.path / JOURNAL
-        try:
+        with read_errors(path):
             return sha256_of(path)
-        except OSError as error:
-            raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None
 
     @property
     def identity(self) -> str:

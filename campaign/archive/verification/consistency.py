@@ -59,13 +59,13 @@ def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList
     """Check that all lines are undamaged and that the first line agrees with the header."""
     for number in story.damaged:
         found.add(f"{place}:{number}", "is not a line of a journal")
-    started = story.all(RunStarted)
-    if not started or not isinstance(story.entries[0], RunStarted):
+    started = story.entries[0] if story.entries else None
+    if not isinstance(started, RunStarted):
         found.add(place, "does not begin with the start of a run")
-    elif started[0].run != header.name:
-        found.add(place, f"is of the run {started[0].run!r}, not of {header.name!r}")
-    elif started[0].trials != header.trials:
-        found.add(place, f"states {started[0].trials} trials; {header.trials} are planned")
+    elif started.run != header.name:
+        found.add(place, f"is of the run {started.run!r}, not of {header.name!r}")
+    elif started.trials != header.trials:
+        found.add(place, f"states {started.trials} trials; {header.trials} are planned")
 
 
 def check_measured(story: Lines, place: str, found: DamageList) -> None:

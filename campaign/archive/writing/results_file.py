@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from campaign.archive.layout.files import PART, publish, sha256_of, why
+from campaign.archive.layout.files import PART, publish, why
 from campaign.archive.layout.results import (
     ENTRY,
     FORMAT,
@@ -94,10 +94,7 @@ def prepare_results(run: Path, found: RunResults) -> PreparedResults:
     try:
         with hdf5.closing(hdf5.create_file(prepared.part)) as file:
             place = _Writer(file).write(found)
-        digest = sha256_of(prepared.part, place)
-        with prepared.part.open("r+b") as raw:
-            raw.seek(place[0])
-            raw.write(digest.encode("ascii"))
+        hdf5.put_file_hash(prepared.part, place)
     except OSError as error:
         prepared.discard()
         raise _cannot_be_written(path, error) from None

@@ -141,15 +141,8 @@ class SealedFile:
             yield f"{packed.record}\n".encode()
 
     def put_hash(self) -> None:
-        """Write the hash of the whole file into the file.
-
-        The hash counts its own bytes as zeros. It stays in the file, is unaffected by a viewer that
-        opens the file for writing without changes, and detects any changed byte.
-        """
-        digest = sha256_of(self._part, self._hash_place)
-        with self._part.open("r+b") as file:
-            file.seek(self._hash_place[0])
-            file.write(digest.encode("ascii"))
+        """Write the hash of the whole file into the file."""
+        hdf5.put_file_hash(self._part, self._hash_place)
 
     def discard(self) -> None:
         """Close and remove the file."""
