@@ -23,6 +23,7 @@ from queue import SimpleQueue
 from typing import Protocol, Self
 
 from campaign import processes
+from campaign.archive import RunWriter
 from campaign.archive.layout.journal import Entry
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.backends.interface import Backend, SupportsTiming
@@ -31,7 +32,6 @@ from campaign.execution.attempt import AttemptEnd, Conditions, execute_once, exe
 from campaign.execution.safety import describe
 from campaign.execution.supervision import Supervision
 from campaign.execution.trial_metrics import TrialMeasurement
-from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
 from campaign.policy import SampleRetention
 from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Timing, Work
@@ -72,7 +72,7 @@ class BatchExecutor(Protocol):
         """Check the workers; called while no batch reports."""
 
 
-OpenExecutor = Callable[[Conditions, PlanWriter], AbstractContextManager[BatchExecutor]]
+OpenExecutor = Callable[[Conditions, RunWriter], AbstractContextManager[BatchExecutor]]
 """Opens an executor of batches under these conditions, for the writer of the run."""
 
 
@@ -248,7 +248,7 @@ class BatchWorker:
 class ProcessExecutor:
     """A pool of local processes. After the death of one, a new pool takes the next batches."""
 
-    def __init__(self, count: int, conditions: Conditions, writer: PlanWriter) -> None:
+    def __init__(self, count: int, conditions: Conditions, writer: RunWriter) -> None:
         self.most_pending = count + 1  # no worker waits while the parent writes the journal
         self._count = count
         self._writer = writer
@@ -353,7 +353,7 @@ class ProcessExecutor:
 
 @contextmanager
 def process_executor(
-    conditions: Conditions, writer: PlanWriter, *, count: int
+    conditions: Conditions, writer: RunWriter, *, count: int
 ) -> Iterator[ProcessExecutor]:
     """Executor with `count` processes, which start with the first batch."""
     executor = ProcessExecutor(count, conditions, writer)

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+from campaign.archive import RunWriter
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.archived_metrics import Measure
@@ -25,7 +26,6 @@ from campaign.execution.sequence import TrialSequence
 from campaign.execution.stages import Stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
-from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy, SampleRetention
 from campaign.recording import Outcome, PanicStop
 from campaign.stopwatch import Work
@@ -38,7 +38,7 @@ _NOTHING: Mapping[int, Outcome] = MappingProxyType({})
 def run_plan(
     trials: Sequence[Trial],
     backend: Backend,
-    writer: PlanWriter,
+    writer: RunWriter,
     *,
     workers: int,
     display: Display,

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from campaign.archive import ArchivedTrial
+from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.followup_trials import trials_followed
 from campaign.archive.layout.journal import TrialsFollowed, utc_now
 from campaign.archive.reading.archived_metrics import Measure
@@ -24,7 +24,6 @@ from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.safety import describe
-from campaign.execution.writer import PlanWriter
 from campaign.experiments.interface import (
     Experiment,
     TestData,
@@ -35,6 +34,7 @@ from campaign.experiments.interface import (
 from campaign.protocol.stage_trials import Refusal, StageTrials, TooMuchError, follow
 from campaign.protocol.stages import PlannedStage, place_of
 from campaign.reason import Cause
+from campaign.text import count
 from campaign.trial import Role, Trial, canonical_json
 
 NOTHING_TOLD = Cause("nothing found", "the recording shows nothing")
@@ -53,7 +53,7 @@ class Stages:
         self,
         planned: Iterable[PlannedStage],
         trials: Sequence[Trial],
-        archive: PlanWriter,
+        archive: RunWriter,
         experiments: Mapping[str, Experiment],
         refusal: Refusal,
         *,
@@ -160,13 +160,13 @@ class Stages:
         requests = each_in_axis_terms(bench.sides, asked)
         return follow(stage, experiment, requests, first, self._next, self._refusal)
 
-    def _measured(self, trial: TrialData) -> TrialData:
+    def _measured(self, trial: ArchivedTrial) -> ArchivedTrial:
         """The trial with its metrics, measured now if none are archived; never empty.
 
         The bench waits for the stage. An experiment's `measure` that hung at the end of its trial
         must not hang here; `UNKNOWN` marks a trial that is not to be measured again.
         """
-        if self._measure is None or trial.estimates or not isinstance(trial, ArchivedTrial):
+        if self._measure is None or trial.estimates:
             return trial
         return replace(trial, estimates=self._measure(trial).estimates or (UNKNOWN,))
 
@@ -201,8 +201,8 @@ def _failure(entry: TrialsFollowed) -> str:
     if entry.reason:
         return f"{entry.title} failed: {entry.reason}"
     if entry.refused:
-        count = len(entry.refused)
-        what = "a trial was" if count == 1 else f"{count} trials were"
+        refused = len(entry.refused)
+        what = "a trial was" if refused == 1 else f"{refused} trials were"
         return f"{entry.title}: {what} refused: {entry.refused[0].why}"
     return ""
 
@@ -211,8 +211,7 @@ def _remarks(entry: TrialsFollowed) -> list[str]:
     """Remarks for the operator about an evaluated stage."""
     if entry.reason:
         return [_failure(entry)]
-    count = len(entry.trials)
-    remarks = [f"{entry.title}: {'1 trial follows' if count == 1 else f'{count} trials follow'}"]
+    remarks = [f"{entry.title}: {count(len(entry.trials), 'trial follows', 'trials follow')}"]
     remarks += [f"refused: {each.label}: {each.why}" for each in entry.refused[:TOLD]]
     if len(entry.refused) > TOLD:
         remarks.append(f"and {len(entry.refused) - TOLD} more trials are refused")

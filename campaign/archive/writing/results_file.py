@@ -8,10 +8,11 @@ tables can be plotted; viewers open the most important one. This program reads b
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -42,8 +43,9 @@ from campaign.archive.writing.plots import (
 )
 from campaign.archive.writing.result_tables import put_findings, put_table
 from campaign.errors import ArchiveError, UsageError
-from campaign.result import Array, Curve, Figure, Panel
+from campaign.result import Array, Curve, Figure, Panel, Table
 
+_Keyed = TypeVar("_Keyed", Figure, Table)
 PUBLISHED = "published"
 ARRAYS = "arrays"
 """Arrays of results that are in no plot."""
@@ -179,16 +181,12 @@ class _Writer:
                 put_findings(process, part, findings)
         figures = {
             figure.key: next(iter(shown), "")
-            for figure, key in zip(
-                result.figures, names_of([each.key for each in result.figures]), strict=True
-            )
+            for key, figure in _named(result.figures)
             if (shown := list(self._figure(process, f"{name}/", f"figure_{key}", figure)))
         }
         tables = [
             f"table_{key}"
-            for table, key in zip(
-                result.tables, names_of([each.key for each in result.tables]), strict=True
-            )
+            for key, table in _named(result.tables)
             if put_table(process, f"table_{key}", table)
         ]
         wanted = found.telling[1] if found.telling and found.telling[0] == test.name else ""
@@ -258,6 +256,11 @@ def _process(
     hdf5.put_text(process, "date", date)
     hdf5.put_integer(process, "sequence_index", number)
     return process
+
+
+def _named(items: Sequence[_Keyed]) -> Iterable[tuple[str, _Keyed]]:
+    """Figures or tables, each with a valid and unique name from its key."""
+    return zip(names_of([each.key for each in items]), items, strict=True)
 
 
 def _note(parent: h5py.Group, name: str, kind: str, text: str) -> None:
