@@ -59,10 +59,10 @@ def summarise(path: Path) -> RunSummary:
             size = sum(file.stat().st_size for file in path.iterdir())
             run = _glance_at_folder(path)
         else:
-            from campaign.archive.reading import open_run
+            from campaign.archive.reading import sealed_run
 
             size = path.stat().st_size
-            run = open_run.read_glance(path)
+            run = sealed_run.read_glance(path)
     except (ArchiveError, OSError) as error:
         sealed = path.with_suffix(SEALED)
         if path.suffix == PARTIAL and sealed.is_file():

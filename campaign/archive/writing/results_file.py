@@ -119,11 +119,7 @@ class _Writer:
 
     def write(self, found: RunResults) -> tuple[int, int]:
         """Write all content; return the offset and length of the file's hash."""
-        hdf5.put_attribute(self.file, "NX_class", "NXroot")
-        hdf5.put_attribute(self.file, "creator", "campaign")
-        hdf5.put_attribute(self.file, "creator_version", found.version)
-        hdf5.put_attribute(self.file, "file_time", found.date)
-        hdf5.put_attribute(self.file, "default", ENTRY)
+        hdf5.put_root(self.file, found.version, found.date, ENTRY)
         entry = hdf5.make_group(self.file, ENTRY, "NXentry")
         _describe(entry, found)
         names = names_of([*MEMBERS, *(test.name for test in found.tests), PUBLISHED])[
