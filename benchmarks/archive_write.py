@@ -46,7 +46,7 @@ def write_ours(folder: Path, times: np.ndarray, block: np.ndarray) -> Path:
     for start in range(0, len(times), RATE):
         file.append(times[start : start + RATE], block[:, start : start + RATE])
     now = "2026-01-01T00:00:00Z"
-    return folder / file.close(Ending(Outcome.COMPLETED), now, now).name
+    return folder / file.close(Ending(Outcome.COMPLETED), now, now)[0].file
 
 
 def write_with_filters(folder: Path, times: np.ndarray, block: np.ndarray) -> Path:

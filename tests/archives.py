@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.results import RunResults
+from campaign.archive.writing.results_file import prepare_results
 from campaign.backends.interface import Backend
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
@@ -84,3 +86,12 @@ def _header(tests: Sequence[object], results: Path) -> RunHeader:
         {"name": name, "created": "2026-11-21T09:36:58Z", "title": "A stabilized axis"}
         | {"protocol_name": "axis", "backend": "sim", "tests": tests}
     )
+
+
+def write_results(run: Path, found: RunResults) -> Path:
+    """The file of results beside the run at `run`, as the program writes it."""
+    prepared = prepare_results(run, found)
+    try:
+        return prepared.publish()
+    finally:
+        prepared.discard()

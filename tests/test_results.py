@@ -23,12 +23,11 @@ from campaign.archive import open_run
 from campaign.archive.layout.results import results_path
 from campaign.archive.layout.results_text import from_text, to_text
 from campaign.archive.reading.results_file import read_results
-from campaign.archive.writing.results_file import write_results
 from campaign.cli.report import report_run
 from campaign.errors import ArchiveError, ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.result import Finding, Result
-from tests.archives import PROTOCOL, simulated_run
+from tests.archives import PROTOCOL, simulated_run, write_results
 from tests.drawings import keep_drawings
 from tests.system.user import completed
 

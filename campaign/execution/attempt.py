@@ -14,7 +14,7 @@ from campaign.errors import ArchiveError, CampaignError
 from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
-from campaign.execution.writer import Begins, TrialWriter
+from campaign.execution.writer import Begins
 from campaign.policy import KEEP_ALL, SampleRetention
 from campaign.recording import Ending, Outcome, SafeState
 from campaign.stopwatch import Work
@@ -61,7 +61,7 @@ def execute_once(trial: Trial, conditions: Conditions) -> AttemptEnd:
     """Execute `trial` once and archive it, however it ends. Raises only errors of the archive."""
     supervision = conditions.supervision
     with supervision.timing.span(Work.SAMPLES):  # less the spans of other kinds of work
-        attempt = _Attempt.begin(trial, conditions)
+        attempt = _Attempt(trial, conditions)
         if not supervision.live:
             return attempt.archive(attempt.concluded(attempt.execute()))
         with HEARTBEAT.expected():
@@ -82,64 +82,44 @@ def execute_together(
     if not isinstance(backend, ExecutesTogether):
         raise TypeError("this backend executes one trial at a time")
     with conditions.supervision.timing.span(Work.SAMPLES):
-        _execute_together(trials, backend, conditions, on_end)
+        attempts = dict(enumerate(_Attempt(trial, conditions) for trial in trials))
 
+        def end(place: int, executed: AttemptEnd) -> None:
+            attempt = attempts.pop(place)
+            on_end(attempt.trial, attempt.archive(attempt.concluded(executed)))
 
-def _execute_together(
-    trials: Sequence[Trial],
-    backend: ExecutesTogether,
-    conditions: Conditions,
-    on_end: Callable[[Trial, AttemptEnd], None],
-) -> None:
-    attempts = dict(enumerate(_Attempt.begin(trial, conditions) for trial in trials))
-
-    def end(place: int, executed: AttemptEnd) -> None:
-        attempt = attempts.pop(place)
-        on_end(attempt.trial, attempt.archive(attempt.concluded(executed)))
-
-    recorders = [attempt.recorder for attempt in attempts.values()]
-    stops = [attempt.stop for attempt in attempts.values()]
-    unreported = Ending(
-        Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED
-    )
-    left = AttemptEnd(unreported, gave_up=True)
-    try:
-        for place, ending in calls.called(backend, "execute_together", trials, recorders, stops):
-            if place not in attempts:
-                raise LookupError(f"no trial is at place {place!r}, or it has ended")
-            end(place, AttemptEnd(calls.checked_ending(ending, backend)))
-            if not attempts:
-                break
-    except BaseException as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
-        left = _failed(calls.as_fault(error, backend, "execute_together"))
-    for place in tuple(attempts):
-        end(place, left)
+        recorders = [attempt.recorder for attempt in attempts.values()]
+        stops = [attempt.stop for attempt in attempts.values()]
+        unreported = Ending(
+            Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED
+        )
+        left = AttemptEnd(unreported, gave_up=True)
+        try:
+            for place, ending in calls.called(
+                backend, "execute_together", trials, recorders, stops
+            ):
+                if place not in attempts:
+                    raise LookupError(f"no trial is at place {place!r}, or it has ended")
+                end(place, AttemptEnd(calls.checked_ending(ending, backend)))
+                if not attempts:
+                    break
+        except BaseException as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
+            left = _failed(calls.as_fault(error, backend, "execute_together"))
+        for place in tuple(attempts):
+            end(place, left)
 
 
 class _Attempt:
     """One trial under execution, with its recorder, stop flag and file."""
 
-    def __init__(
-        self,
-        trial: Trial,
-        backend: Backend,
-        file: TrialWriter,
-        recorder: SupervisingRecorder,
-        stop: TrialStop,
-        measure: Measure | None,
-    ) -> None:
-        self.trial, self.backend, self.recorder, self.stop = trial, backend, recorder, stop
-        self._file = file
-        self._measure = measure
-        self._started = utc_now()
-
-    @classmethod
-    def begin(cls, trial: Trial, conditions: Conditions) -> _Attempt:
+    def __init__(self, trial: Trial, conditions: Conditions) -> None:
         """Open the trial's file."""
-        file = conditions.writer.begin(trial, conditions.keeping)
-        stop = TrialStop(conditions.halted)
-        recorder = SupervisingRecorder(trial, file, stop, conditions.supervision)
-        return cls(trial, conditions.backend, file, recorder, stop, conditions.measure)
+        self.trial, self.backend = trial, conditions.backend
+        self._file = conditions.writer.begin(trial, conditions.keeping)
+        self.stop = TrialStop(conditions.halted)
+        self.recorder = SupervisingRecorder(trial, self._file, self.stop, conditions.supervision)
+        self._measure = conditions.measure
+        self._started = utc_now()
 
     def execute(self) -> AttemptEnd:
         """Execute on the backend, and return its ending. Raises errors of the archive."""

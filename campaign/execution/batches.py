@@ -36,10 +36,6 @@ class Batches:
         """The next trial; None if none are left."""
         return self._waiting[0] if self._waiting else None
 
-    def again(self, trial: Trial) -> None:
-        """Put `trial` first again."""
-        self._waiting.appendleft(trial)
-
     def insert(self, trials: Sequence[Trial]) -> None:
         """Put `trials` first, in their order."""
         self._waiting.extendleft(reversed(trials))

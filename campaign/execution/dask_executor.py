@@ -22,6 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from campaign.archive import RunWriter
 from campaign.archive.layout.files import PART, keep_umask, publish_all
 from campaign.archive.writing.trial_file import lost_trial
 from campaign.backends import backends, calls
@@ -36,7 +37,6 @@ from campaign.execution.executors import (
     WorkerLostError,
     WorkerSetup,
 )
-from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
@@ -161,7 +161,7 @@ class Cluster:
                 self.usable[name] = present[name]
 
     @contextmanager
-    def executor(self, conditions: Conditions, writer: PlanWriter) -> Iterator[DaskExecutor]:
+    def executor(self, conditions: Conditions, writer: RunWriter) -> Iterator[DaskExecutor]:
         """An executor on the workers of this cluster."""
         executor = DaskExecutor(self._client, self, conditions, writer)
         try:
@@ -194,7 +194,7 @@ class DaskExecutor:
     """A `BatchExecutor` on a cluster."""
 
     def __init__(
-        self, client: Client, at: Cluster, conditions: Conditions, writer: PlanWriter
+        self, client: Client, at: Cluster, conditions: Conditions, writer: RunWriter
     ) -> None:
         self.most_pending = 2 * at.threads  # no worker waits while files are written here
         self._client, self._cluster, self._writer = client, at, writer
@@ -276,14 +276,7 @@ class DaskExecutor:
             part = self._writer.folder / next(iter(outcome.files), "trial")
             future.set_exception(lost_trial(part, error, count=len(outcome.files)))
             return
-        trials = {trial.number: trial for trial in batch}
-        for number, executed, entries in outcome.ended:
-            on_end(trials[number], executed, entries)
-        self._timing.add_worker(outcome.spent)
-        if outcome.error is None:
-            future.set_result(None)
-        else:
-            future.set_exception(outcome.error)
+        outcome.report(batch, on_end, self._timing, future)
 
     def _fail(self, future: Future[None], result: Any) -> None:
         """Pass on the error of the worker, or WorkerLostError if worker or scheduler is lost."""

@@ -10,6 +10,7 @@ from typing import Literal
 from campaign.estimate import Estimate
 from campaign.policy import Policy, Rest
 from campaign.recording import Ending
+from campaign.text import count
 from campaign.trial import Trial
 
 
@@ -43,7 +44,7 @@ class Responses:
             return Choice(response.do, reason)
         retries = self._retries.get(trial.number, 0)
         if retries >= response.times:
-            return Choice(response.then, f"{reason}; after {_times(retries, 'retry', 'retries')}")
+            return Choice(response.then, f"{reason}; after {count(retries, 'retry', 'retries')}")
         self._retries[trial.number] = retries + 1
         return Choice("retry", f"{reason}; retry {retries + 1} of {response.times}", response.pause)
 
@@ -85,7 +86,3 @@ def extremes(trials: Iterable[Trial], metrics: Mapping[int, Sequence[Estimate]])
         for choose, which in ((min, "smallest"), (max, "largest")):
             roles.setdefault(choose(values, key=values.__getitem__), []).append(f"{which} {name}")
     return {number: ", ".join(which) for number, which in roles.items()}
-
-
-def _times(count: int, one: str, many: str) -> str:
-    return f"{count} {one if count == 1 else many}"

@@ -139,8 +139,7 @@ class PlainDisplay:
         due = time.monotonic() - self._printed >= PLAIN_INTERVAL
         if test and (test not in self._begun or due or not progress.left):
             self._begun.add(test)
-            parts = ", ".join(filter(None, (counts(progress), time_left(progress))))
-            self._print(Text(f"{test}: {parts}"))
+            self._print(Text(f"{test}: {standing(progress)}"))
 
     def hidden(self) -> AbstractContextManager[None]:
         """Nothing to hide: plain lines do not disturb a prompt."""
@@ -184,6 +183,11 @@ def time_left(progress: Progress) -> str:
     if progress.time_left is None or not progress.left:
         return ""
     return f"about {clock(progress.time_left)} left"
+
+
+def standing(progress: Progress) -> str:
+    """Counts and remaining time, in one line."""
+    return ", ".join(filter(None, (counts(progress), time_left(progress))))
 
 
 def clock(seconds: float) -> str:

@@ -23,6 +23,7 @@ from queue import SimpleQueue
 from typing import Protocol, Self
 
 from campaign import processes
+from campaign.archive import RunWriter
 from campaign.archive.layout.journal import Entry
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.backends.interface import Backend, SupportsTiming
@@ -31,10 +32,9 @@ from campaign.execution.attempt import AttemptEnd, Conditions, execute_once, exe
 from campaign.execution.safety import describe
 from campaign.execution.supervision import Supervision
 from campaign.execution.trial_metrics import TrialMeasurement
-from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
 from campaign.policy import SampleRetention
-from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
+from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Timing, Work
 from campaign.trial import Trial
 
 FORGOTTEN = 5.0
@@ -72,7 +72,7 @@ class BatchExecutor(Protocol):
         """Check the workers; called while no batch reports."""
 
 
-OpenExecutor = Callable[[Conditions, PlanWriter], AbstractContextManager[BatchExecutor]]
+OpenExecutor = Callable[[Conditions, RunWriter], AbstractContextManager[BatchExecutor]]
 """Opens an executor of batches under these conditions, for the writer of the run."""
 
 
@@ -188,6 +188,19 @@ class BatchResult:
     spent: Mapping[Work, Spent]
     files: Mapping[str, bytes] = field(default_factory=dict)
 
+    def report(
+        self, batch: Sequence[Trial], on_end: OnEnd, timing: Timing, future: Future[None]
+    ) -> None:
+        """Report its trials to `on_end`, then the end of the batch to `future`."""
+        trials = {trial.number: trial for trial in batch}
+        for number, executed, entries in self.ended:
+            on_end(trials[number], executed, entries)
+        timing.add_worker(self.spent)
+        if self.error is None:
+            future.set_result(None)
+        else:
+            future.set_exception(self.error)
+
 
 class BatchWorker:
     """Executes batches in a process without the run's journal."""
@@ -235,7 +248,7 @@ class BatchWorker:
 class ProcessExecutor:
     """A pool of local processes. After the death of one, a new pool takes the next batches."""
 
-    def __init__(self, count: int, conditions: Conditions, writer: PlanWriter) -> None:
+    def __init__(self, count: int, conditions: Conditions, writer: RunWriter) -> None:
         self.most_pending = count + 1  # no worker waits while the parent writes the journal
         self._count = count
         self._writer = writer
@@ -324,14 +337,7 @@ class ProcessExecutor:
             return
         if self._pending.pop(future, None) is None:  # already treated as lost
             return
-        trials = {trial.number: trial for trial in batch}
-        for number, executed, entries in returned.ended:
-            on_end(trials[number], executed, entries)
-        self._timing.add_worker(returned.spent)
-        if returned.error is None:
-            future.set_result(None)
-        else:
-            future.set_exception(returned.error)
+        returned.report(batch, on_end, self._timing, future)
 
     def _on_loss(self, pool: ProcessPoolExecutor, future: Future[None]) -> None:
         """The death of one process ends its pool and every batch submitted to it."""
@@ -347,7 +353,7 @@ class ProcessExecutor:
 
 @contextmanager
 def process_executor(
-    conditions: Conditions, writer: PlanWriter, *, count: int
+    conditions: Conditions, writer: RunWriter, *, count: int
 ) -> Iterator[ProcessExecutor]:
     """Executor with `count` processes, which start with the first batch."""
     executor = ProcessExecutor(count, conditions, writer)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from campaign.execution.writer import PlanWriter
+from campaign.archive import RunWriter
 from campaign.trial import Trial
 
 Stop = Callable[[], bool]
@@ -64,7 +64,7 @@ UNATTENDED = Attendance(SimulatedOperator(), no_wait)
 class SetUp:
     """Confirmed setup of the bench, to avoid repeated prompts."""
 
-    def __init__(self, operator: Operator, writer: PlanWriter) -> None:
+    def __init__(self, operator: Operator, writer: RunWriter) -> None:
         self._operator = operator
         self._writer = writer
         self._confirmed: tuple[str, ...] = ()

@@ -21,10 +21,6 @@ class Progress:
         total: number of trials of the plan and of evaluated stages.
         done, failed, interrupted: number of completed, failed and stopped trials.
         running: trials being executed, in plan order.
-        started: begin of the run on `time.monotonic` (s).
-        elapsed: wall-clock time since then (s).
-        bench_time: bench time of ended trials and completed part of running ones (s).
-        bench_time_left: remaining bench time (s).
         ended: the trial that has just ended, and its ending.
         remark: latest decision of the run, as text.
         closing: whether all trials have ended and the archive is being closed.
@@ -37,10 +33,6 @@ class Progress:
     failed: int
     interrupted: int
     running: tuple[Trial, ...]
-    started: float
-    elapsed: float
-    bench_time: float
-    bench_time_left: float
     ended: tuple[Trial, Ending] | None = None
     remark: str = ""
     closing: bool = False
@@ -74,8 +66,6 @@ class Ledger:
     ) -> None:
         waiting = [trial for trial in trials if trial.number not in finished]
         self._total = len(trials)
-        self._bench_time_left = sum(trial.task.duration for trial in waiting)
-        self._bench_time = 0.0
         self._worth = partial(worth, computed=computed)
         self._worth_left = sum(map(self._worth, waiting))
         self._worth_done = 0.0
@@ -85,7 +75,6 @@ class Ledger:
         self._reached: dict[int, float] = {}
         self._last_report = 0.0
         self._outcomes: dict[Outcome, int] = dict(Counter(finished.values()))
-        self._started = time.monotonic()
 
     @property
     def outcomes(self) -> dict[Outcome, int]:
@@ -100,7 +89,6 @@ class Ledger:
     def add(self, trials: Sequence[Trial]) -> None:
         """Add the trials of a stage."""
         self._total += len(trials)
-        self._bench_time_left += sum(trial.task.duration for trial in trials)
         self._worth_left += sum(map(self._worth, trials))
 
     def begin(self, *trials: Trial) -> None:
@@ -127,8 +115,6 @@ class Ledger:
         self._running.pop(trial.number, None)
         self._reached.pop(trial.number, None)
         self._outcomes[ending.outcome] = self._outcomes.get(ending.outcome, 0) + 1
-        self._bench_time += trial.task.duration
-        self._bench_time_left -= trial.task.duration
         self._worth_done += self._worth(trial)
         self._worth_left -= self._worth(trial)
         self._report((trial, ending))
@@ -136,8 +122,6 @@ class Ledger:
     def take_back(self, trial: Trial) -> None:
         """Uncount a completed trial that is executed again."""
         self._outcomes[Outcome.COMPLETED] -= 1
-        self._bench_time -= trial.task.duration
-        self._bench_time_left += trial.task.duration
         self._worth_done -= self._worth(trial)
         self._worth_left += self._worth(trial)
 
@@ -158,13 +142,12 @@ class Ledger:
     def _report(
         self, ended: tuple[Trial, Ending] | None, remark: str = "", *, closing: bool = False
     ) -> None:
-        self._last_report = running = self._of_running()
+        self._last_report = self._of_running()
         shares = {
             number: self._reached.get(number, 0.0) / trial.task.duration
             for number, trial in self._running.items()
         }
         begun = sum(share * self._worth(self._running[n]) for n, share in shares.items())
-        now = time.monotonic()
         self._display(
             Progress(
                 total=self._total,
@@ -172,16 +155,14 @@ class Ledger:
                 failed=sum(n for outcome, n in self._outcomes.items() if outcome.failed),
                 interrupted=self._outcomes.get(Outcome.INTERRUPTED, 0),
                 running=tuple(self._running[number] for number in sorted(self._running)),
-                started=self._started,
-                elapsed=now - self._started,
-                bench_time=self._bench_time + running,
-                bench_time_left=max(0.0, self._bench_time_left - running),
                 ended=ended,
                 remark=remark,
                 closing=closing,
                 under_way=sum(shares.values()),
                 time_left=self._forecast.time_left(
-                    now, self._worth_done + begun, max(0.0, self._worth_left - begun)
+                    time.monotonic(),
+                    self._worth_done + begun,
+                    max(0.0, self._worth_left - begun),
                 ),
             )
         )

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+from campaign.archive import RunWriter
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.archived_metrics import Measure
@@ -22,10 +23,9 @@ from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import EarlyEnd, safe_afterwards, unsafe_first
 from campaign.execution.sequence import TrialSequence
-from campaign.execution.stages import Stages, no_stages
+from campaign.execution.stages import Stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
-from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy, SampleRetention
 from campaign.recording import Outcome, PanicStop
 from campaign.stopwatch import Work
@@ -38,7 +38,7 @@ _NOTHING: Mapping[int, Outcome] = MappingProxyType({})
 def run_plan(
     trials: Sequence[Trial],
     backend: Backend,
-    writer: PlanWriter,
+    writer: RunWriter,
     *,
     workers: int,
     display: Display,
@@ -74,7 +74,8 @@ def run_plan(
     """
     ledger = Ledger(trials, display, finished, computed=isinstance(backend, KnowsCost))
     ended = EarlyEnd(kept=writer.folder)
-    stages, policy = stages or no_stages(), policy or Policy()
+    policy = policy or Policy()
+    stages = stages or Stages((), (), writer, {}, lambda trial: "")
     waiting = stages.in_order(trial for trial in trials if trial.number not in finished)
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
     sequence = TrialSequence(

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, wait
 from queue import Empty, SimpleQueue
 
+from campaign.archive import RunWriter
 from campaign.archive.layout.journal import Entry
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import AttemptEnd
@@ -22,7 +23,6 @@ from campaign.execution.progress import Ledger
 from campaign.execution.safety import EarlyEnd, make_safe
 from campaign.execution.stages import Stages
 from campaign.execution.stop import StopSwitch
-from campaign.execution.writer import PlanWriter
 from campaign.policy import Policy
 from campaign.recording import Ending, Outcome, PanicStop, SafeState
 from campaign.trial import Trial
@@ -48,7 +48,7 @@ class TrialSequence:
         trials: Sequence[Trial],
         waiting: Iterable[Trial],
         backend: Backend,
-        writer: PlanWriter,
+        writer: RunWriter,
         workers: int,
         ledger: Ledger,
         ended: EarlyEnd,
@@ -260,5 +260,5 @@ class TrialSequence:
         pause = f" in {choice.pause:g} s" if choice.pause else ""
         self._ledger.remark(f"{trial.name} is executed again{pause}")
         self._attendance.wait(choice.pause, self.outside)
-        self._batches.again(trial)  # after a stop it remains for a resume
+        self._batches.insert([trial])  # after a stop it remains for a resume
         return False

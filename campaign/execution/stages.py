@@ -12,9 +12,8 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
-from campaign.archive import ArchivedTrial
+from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.followup_trials import trials_followed
 from campaign.archive.layout.journal import TrialsFollowed, utc_now
 from campaign.archive.reading.archived_metrics import Measure
@@ -35,21 +34,12 @@ from campaign.experiments.interface import (
 from campaign.protocol.stage_trials import Refusal, StageTrials, TooMuchError, follow
 from campaign.protocol.stages import PlannedStage, place_of
 from campaign.reason import Cause
+from campaign.text import count
 from campaign.trial import Role, Trial, canonical_json
 
 NOTHING_TOLD = Cause("nothing found", "the recording shows nothing")
 TOLD = 3
 """Number of refused trials per stage that are reported individually; the journal has all."""
-
-
-class StageArchive(Protocol):
-    """Methods of the run's archive that stages use (`campaign.archive.RunWriter`)."""
-
-    def archived(self, number: int) -> TrialData:
-        """A finished trial of this run. Raises ArchiveError, LookupError."""
-
-    def trials_followed(self, followed: TrialsFollowed) -> None:
-        """Journal a stage's trials. Raises ArchiveError."""
 
 
 UNKNOWN = Estimate.without_interval("nothing", math.nan, "", NOTHING_TOLD())
@@ -63,7 +53,7 @@ class Stages:
         self,
         planned: Iterable[PlannedStage],
         trials: Sequence[Trial],
-        archive: StageArchive,
+        archive: RunWriter,
         experiments: Mapping[str, Experiment],
         refusal: Refusal,
         *,
@@ -148,7 +138,7 @@ class Stages:
             reason = describe(error)
         what = (stage.test, stage.number, stage.name, stage.point)
         entry = trials_followed(utc_now(), *what, outcome.trials, outcome.refused, reason)
-        self._archive.trials_followed(entry)
+        self._archive.note(entry)
         self._waiting.popleft()
         self._trials[stage.place] += outcome.trials
         self._next += len(outcome.trials)
@@ -170,13 +160,13 @@ class Stages:
         requests = each_in_axis_terms(bench.sides, asked)
         return follow(stage, experiment, requests, first, self._next, self._refusal)
 
-    def _measured(self, trial: TrialData) -> TrialData:
+    def _measured(self, trial: ArchivedTrial) -> ArchivedTrial:
         """The trial with its metrics, measured now if none are archived; never empty.
 
         The bench waits for the stage. An experiment's `measure` that hung at the end of its trial
         must not hang here; `UNKNOWN` marks a trial that is not to be measured again.
         """
-        if self._measure is None or trial.estimates or not isinstance(trial, ArchivedTrial):
+        if self._measure is None or trial.estimates:
             return trial
         return replace(trial, estimates=self._measure(trial).estimates or (UNKNOWN,))
 
@@ -211,8 +201,8 @@ def _failure(entry: TrialsFollowed) -> str:
     if entry.reason:
         return f"{entry.title} failed: {entry.reason}"
     if entry.refused:
-        count = len(entry.refused)
-        what = "a trial was" if count == 1 else f"{count} trials were"
+        refused = len(entry.refused)
+        what = "a trial was" if refused == 1 else f"{refused} trials were"
         return f"{entry.title}: {what} refused: {entry.refused[0].why}"
     return ""
 
@@ -221,24 +211,8 @@ def _remarks(entry: TrialsFollowed) -> list[str]:
     """Remarks for the operator about an evaluated stage."""
     if entry.reason:
         return [_failure(entry)]
-    count = len(entry.trials)
-    remarks = [f"{entry.title}: {'1 trial follows' if count == 1 else f'{count} trials follow'}"]
+    remarks = [f"{entry.title}: {count(len(entry.trials), 'trial follows', 'trials follow')}"]
     remarks += [f"refused: {each.label}: {each.why}" for each in entry.refused[:TOLD]]
     if len(entry.refused) > TOLD:
         remarks.append(f"and {len(entry.refused) - TOLD} more trials are refused")
     return remarks
-
-
-class _Nothing:
-    """The archive of a run without stages."""
-
-    def archived(self, number: int) -> TrialData:
-        raise LookupError(number)
-
-    def trials_followed(self, followed: TrialsFollowed) -> None:
-        return None
-
-
-def no_stages() -> Stages:
-    """Stages of a run without later stages."""
-    return Stages((), (), _Nothing(), {}, lambda trial: "")

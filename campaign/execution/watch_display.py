@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from campaign.execution.display import CLOSING, counts, current_test, news, time_left
+from campaign.execution.display import CLOSING, current_test, news, standing
 from campaign.execution.progress import Progress
 from campaign.plain_text import printable
 from campaign.recording import Array, ChannelInfo
@@ -207,5 +207,4 @@ def _plot(
 def _line(progress: Progress) -> str:
     if progress.closing:
         return CLOSING
-    parts = filter(None, (counts(progress), time_left(progress)))
-    return f"{printable(current_test(progress))}: {', '.join(parts)}"
+    return f"{printable(current_test(progress))}: {standing(progress)}"

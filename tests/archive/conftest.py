@@ -139,11 +139,11 @@ def begin_trial(
 
 
 def record_trial(
-    writer: Any, trial: Trial, samples: Any, *how: Any, ending: Ending | None = None, **more: Any
+    writer: Any, trial: Trial, samples: Any, *how: Any, ending: Ending | None = None
 ) -> Any:
     """A trial that has ended, as `begin_trial` begins it: its recorder."""
     recorder = begin_trial(writer, trial, samples, *how)
-    recorder.finish(ending or Ending(Outcome.COMPLETED), STARTED, ENDED, **more)
+    recorder.finish(ending or Ending(Outcome.COMPLETED), STARTED, ENDED)
     return recorder
 
 

@@ -100,7 +100,7 @@ def test_a_sealed_run_of_format_3_is_what_its_seal_says():
     run = kept_3("format-3.nxs")
     assert (run.status, run.reason) == (RunStatus.FAULT, "the operator said no")
     assert run.ended == "2026-11-22T08:07:00.000+00:00"
-    assert run.unchanged()
+    assert verify_run(run.path).sound
     assert run.root == "0af35a0a17f6a6ef298d08a40a8c2f279819bc5fe7eba1a5db02d7d6656a07cd"
     assert run.trials[2].estimates == (
         Estimate("peak_rate", 29.5, "rad/s", reason=Reason("text", "one sample")),

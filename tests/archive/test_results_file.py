@@ -23,7 +23,6 @@ from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.results import ENTRY, HASH, ResultsOfTest, RunResults, results_path
 from campaign.archive.layout.results_text import from_text, to_text
 from campaign.archive.reading.results_file import OtherLayoutError, read_results
-from campaign.archive.writing.results_file import write_results
 from campaign.cli.keep_results import _found_when_whole
 from campaign.cli.verify import _of_results
 from campaign.errors import ArchiveError, UsageError
@@ -32,6 +31,7 @@ from campaign.reason import Cause
 from campaign.result import Axis, Column, Curve, Figure, Finding, Mark, Panel, Result, Table
 from tests.archive.recorded_calls import recorded
 from tests.archive.test_nexus import nxcheck
+from tests.archives import write_results
 
 ROOT = "ab" * 32
 TIMES = ("atime", "mtime", "ctime", "btime")

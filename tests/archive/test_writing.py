@@ -21,11 +21,11 @@ def test_memory_is_one_chunk_whatever_is_appended(tmp_path):
     path = tmp_path / "x.trial"
     file = PackedFile(path)
     columns = SampleColumns(["time", "x", "y"], file)
-    assert columns.buffered_bytes == 3 * CHUNK * 8
+    assert columns._buffer.nbytes == 3 * CHUNK * 8
     rows = [np.zeros(5000)] * 3
     for _ in range(40):
         columns.append(rows)
-        assert columns.buffered_bytes == 3 * CHUNK * 8
+        assert columns._buffer.nbytes == 3 * CHUNK * 8
     columns.finish()
     assert [len(series.chunks) for series in columns.series] == [7] * 3  # all but the last is there
     assert columns.length == 200_000

@@ -174,9 +174,9 @@ class MemoryArchive:
             ended, samples = self.endings[number], self.recordings[number]
             return MemoryTrialData(self.trials[number], ended, samples)
 
-    def trials_followed(self, followed: TrialsFollowed) -> None:
+    def note(self, *entries: TrialsFollowed) -> None:
         assert self.sealed is None
-        self.stages.append(followed)
+        self.stages.extend(entries)
 
     @property
     def folder(self) -> Path:

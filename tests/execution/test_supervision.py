@@ -477,6 +477,6 @@ def test_a_long_trial_tells_how_far_it_is(
     first, within = bench.progress[:2]
     assert first.time_left is None
     assert within.running
-    assert (within.bench_time, within.bench_time_left) == (1.0, 1.0)
+    assert within.under_way == 0.5
     assert within.time_left is None  # one sign of work is no pace
-    assert (bench.progress[-1].bench_time, bench.progress[-1].bench_time_left) == (2.0, 0.0)
+    assert (bench.progress[-1].under_way, bench.progress[-1].left) == (0.0, 0)

@@ -87,7 +87,7 @@ def test_undefined_samples_and_no_samples_draw_nothing_and_break_nothing() -> No
 def test_a_terminal_that_takes_nothing_holds_up_neither_samples_nor_progress() -> None:
     taken, terminal = os.pipe()
     display = WatchDisplay(terminal, lambda: os.terminal_size((200, 60)))
-    progress = Progress(9, 1, 0, 0, (TRIAL,), 0.0, 1.0, 1.0, 8.0)
+    progress = Progress(9, 1, 0, 0, (TRIAL,))
 
     def tell(number: int) -> None:
         handed(display.seen, TRIAL.model_copy(update={"number": number}), 0, 10_000)

@@ -12,6 +12,7 @@ import pytest
 
 from campaign.archive import RunStatus, find_run, open_run
 from campaign.archive.reading.run_list import run_paths
+from campaign.archive.verification.verify_run import verify_run
 from tests.system.user import SEA, begun, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
@@ -61,7 +62,7 @@ def kill_again_and_again(folder: Path, kills: int, seed: int) -> int:
         assert known <= numbers, "a finished trial is gone"
         known |= numbers
         if run.sealed and run.status is RunStatus.COMPLETE:
-            assert run.unchanged()
+            assert verify_run(run.path).sound
             assert len(run.trials) == TRIALS
             known = set()
             run.path.unlink()
@@ -73,7 +74,7 @@ def kill_again_and_again(folder: Path, kills: int, seed: int) -> int:
         assert (run.sealed, run.status, len(run.trials)) == (True, RunStatus.COMPLETE, TRIALS)
         assert known <= {trial.trial.name for trial in run.trials}
         assert run.problems() == []
-        assert run.unchanged()
+        assert verify_run(run.path).sound
     return met
 
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 import hashlib
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 BLOCK = 32_768
 """Samples per block."""

@@ -14,6 +14,8 @@ from campaign.archive.layout.journal import TrialFinished
 TRIAL = ".trial"
 """Suffix of the file of one trial, while its run is in progress."""
 
+TRIAL_FILE = re.compile(r"trial-([0-9]{5,10})(?:-([0-9]{1,6}))?\.(?:trial|nxs)")
+"""Name of the file of a trial; older programs wrote `.nxs`."""
 ENTRY = re.compile(r"trial_([0-9]{5,10})(?:_attempt_([0-9]{1,6}))?")
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
+
+from campaign.errors import ArchiveError
 
 PART = ".part"
 """Suffix of a file that is being written. Readers do not accept it as an archive."""
@@ -26,6 +29,15 @@ def why(error: Exception) -> str:
     if reason := _REASON.search(message):
         return reason[1]
     return message[:300] or type(error).__name__
+
+
+@contextmanager
+def read_errors(path: Path) -> Iterator[None]:
+    """Convert an OSError in the block to an ArchiveError that names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None
 
 
 def keep_umask() -> None:

@@ -7,7 +7,7 @@ SHA-256 of its canonical JSON; the trials (`plan-trials.jsonl`) refer to it.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -90,10 +90,6 @@ class FullPlan:
         if trial.number != number:
             raise self._damaged(PLAN_TRIALS, number, f"holds trial number {trial.number}")
         return trial
-
-    def trials(self) -> Iterable[Trial]:
-        """All trials in order, one at a time."""
-        return (self.trial(number) for number in range(1, len(self) + 1))
 
     def _damaged(self, name: str, line: int, what: str) -> ArchiveError:
         return ArchiveError(f"{self.path}: {name}, line {line}: {what}")

@@ -43,13 +43,13 @@ def _timestamp(text: str) -> str:
 Timestamp = Annotated[str, AfterValidator(_timestamp)]
 
 
-class _Record(BaseModel):
+class ArchivedModel(BaseModel):
     """Frozen, and tolerant of fields that a later program added."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
-class Truth(_Record):
+class Truth(ArchivedModel):
     """Plants simulated in place of the stated benches; analyses do not receive them."""
 
     option: str = ""
@@ -61,7 +61,7 @@ class Truth(_Record):
     compensation and limits, SI."""
 
 
-class RunHeader(_Record):
+class RunHeader(ArchivedModel):
     """Facts of a run, known before its first trial. All are archived."""
 
     name: Annotated[str, AfterValidator(_run_name)]
@@ -111,7 +111,7 @@ class RunHeader(_Record):
     """SHA-256 of the normalized protocol in canonical JSON."""
 
 
-class PlannedTrial(_Record):
+class PlannedTrial(ArchivedModel):
     """A trial of the plan, whether or not it was executed."""
 
     number: int = Field(ge=1)

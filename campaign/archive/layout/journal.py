@@ -200,7 +200,7 @@ Entry = Annotated[
     | RunEnded,
     Field(discriminator="event"),
 ]
-_ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
+ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 
 
 def utc_now() -> str:
@@ -244,7 +244,7 @@ class Journal:
         try:
             with self._path.open("rb") as file:
                 file.seek(place)
-                return _ENTRY.validate_python(json.loads(file.readline()))
+                return ENTRY.validate_python(json.loads(file.readline()))
         except (OSError, ValueError) as error:
             raise ArchiveError(f"{self._path}: cannot be read: {why(error)}") from None
 

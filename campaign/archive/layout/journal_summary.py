@@ -13,7 +13,9 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from campaign.archive.layout.files import read_errors
 from campaign.archive.layout.journal import (
+    ENTRY,
     Entry,
     RunEnded,
     RunResumed,
@@ -25,7 +27,6 @@ from campaign.archive.layout.json_lines import line_places, parse_at_once
 from campaign.errors import ArchiveError
 from campaign.trial import Outcome
 
-_ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 _ENTRIES: TypeAdapter[list[Entry]] = TypeAdapter(list[Entry])
 _MEASURED = re.compile(rb'"event":"trial measured","record":"([0-9a-f]{64})"')
 """Matches a written line only: within a text, quotes have a backslash."""
@@ -109,10 +110,8 @@ class Lines:
 
 def read_journal(path: Path) -> Lines:
     """Read the journal of a folder without metrics. Raises ArchiveError with an invalid line."""
-    try:
+    with read_errors(path):
         lines = read_lines(path.read_bytes(), lean=True)
-    except OSError as error:
-        raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
     for number in lines.damaged:
         raise ArchiveError(f"{path}:{number}: is not a line of a journal")
     if not lines.begins:
@@ -154,8 +153,8 @@ def read_lines(content: bytes, *, lean: bool = False) -> Lines:
 
 def _parse(line: bytes) -> Entry | None:
     with suppress(ValidationError):
-        return _ENTRY.validate_json(line)  # takes half the time, but rejects lone surrogates
+        return ENTRY.validate_json(line)  # takes half the time, but rejects lone surrogates
     try:
-        return _ENTRY.validate_python(json.loads(line))
+        return ENTRY.validate_python(json.loads(line))
     except (ValidationError, ValueError, RecursionError):
         return None

@@ -11,17 +11,17 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
+from pydantic import Field, JsonValue
 
 from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.header import ArchivedModel
 from campaign.estimate import Estimate, Window
-from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
+from campaign.recording import ChannelInfo, Ending, Fault, Outcome, SafeState
 from campaign.trial import Tree, Trial, canonical_json, tree_text
 
 SHARED = ("bench", "options")
@@ -30,20 +30,13 @@ SHARED = ("bench", "options")
 Trees = Mapping[str, Tree]
 """Benches and options by the SHA-256 of their canonical JSON."""
 
-_ESTIMATE = TypeAdapter(Estimate)
 _TREE = re.compile(r'\{"sha256":"([0-9a-f]{64})","tree":(\{.*\})\}')
 _DETERMINING = ("bench", "task", "seed")
 _DETERMINING_WHERE_THERE = ("truth", "recording")
 """Fields of a trial that form its fingerprint; the latter only if they are not empty."""
 
 
-class _Part(BaseModel):
-    """Frozen, and tolerant of fields that a later program added."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-
-class SeriesRecord(_Part):
+class SeriesRecord(ArchivedModel):
     """A recorded channel: its description, and the digest of its samples."""
 
     name: str
@@ -65,7 +58,7 @@ class SeriesRecord(_Part):
         )
 
 
-class PreviewRecord(_Part):
+class PreviewRecord(ArchivedModel):
     """The digests of a long recording's preview: its times, and one channel."""
 
     channel: str
@@ -74,14 +67,14 @@ class PreviewRecord(_Part):
     values: str
 
 
-class EventRecord(_Part):
+class EventRecord(ArchivedModel):
     """An event, at the time of the trial (s)."""
 
     time: float
     text: str
 
 
-class TrialRecord(_Part):
+class TrialRecord(ArchivedModel):
     """An executed trial.
 
     Attributes:
@@ -200,54 +193,6 @@ def parse_trees(text: str) -> dict[str, Tree]:
         except RecursionError:
             raise ValueError(f"line {number} is nested too deeply") from None
     return trees
-
-
-def make_record(
-    trial: Tree,
-    label: str,
-    fingerprint: str,
-    attempt: int,
-    ending: Ending,
-    times: tuple[str, str],
-    events: Iterable[Event],
-    *,
-    series: tuple[int, str, Sequence[SeriesRecord]] | None,
-    preview: PreviewRecord | None = None,
-    windows: Iterable[Window] = (),
-    estimates: Iterable[Estimate] = (),
-) -> TrialRecord:
-    """The record of a trial that has ended.
-
-    Args:
-        trial: the trial with digests in place of its trees: `shared_trees`.
-        label, fingerprint, attempt: see `TrialRecord`.
-        ending: how it ended.
-        times: when it started and ended, ISO 8601.
-        events: events during the trial.
-        series: length of the recording, digest of its time base, and its channels.
-        preview, windows, estimates: see `TrialRecord`.
-    """
-    samples, time, channels = series or (None, "", ())
-    return TrialRecord(
-        trial=trial,
-        label=label,
-        fingerprint=fingerprint,
-        attempt=attempt,
-        started=times[0],
-        ended=times[1],
-        outcome=ending.outcome,
-        reason=ending.reason,
-        safe_state=ending.safe_state,
-        fault=ending.fault,
-        telemetry=plain(ending.telemetry),
-        samples=samples,
-        time=time,
-        channels=tuple(channels),
-        preview=preview,
-        events=tuple(EventRecord(time=float(e.time), text=e.text) for e in events),
-        windows=tuple(windows),
-        estimates=tuple(_ESTIMATE.validate_python(plain(asdict(e))) for e in estimates),
-    )
 
 
 def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from campaign.archive.layout.files import why
+from campaign.archive.layout.files import read_errors, why
 from campaign.archive.layout.header import FORMAT, PlannedTrial, RunHeader
 from campaign.archive.layout.json_lines import parse_at_once
 from campaign.errors import ArchiveError
@@ -70,8 +70,7 @@ def first_line(error: Exception) -> str:
 def read_text(path: Path) -> str:
     """Read one of the files. Raises ArchiveError if it is unreadable or not UTF-8."""
     try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
+        with read_errors(path):
+            return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise ArchiveError(f"{path}: is not text") from None

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from isal import isal_zlib
-from numpy.typing import NDArray
 
 from campaign.archive.layout.checksums import BLOCK
-
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 CHUNK = BLOCK
 """Samples per chunk, equal to a block of `checksums`. A power of two (see `preview`). The window of

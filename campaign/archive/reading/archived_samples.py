@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -158,24 +157,16 @@ class MemorySamples(PackedSamples):
             yield entry.info.with_samples(self.rows[places[entry.name]].copy())
 
 
-class _Named(Protocol):
-    """Metadata of an archived channel."""
-
-    @property
-    def name(self) -> str: ...
-
-
-NamedT = TypeVar("NamedT", bound=_Named)
-
-
-class LazyChannels(Mapping[str, Channel], Generic[NamedT]):
+class LazyChannels(Mapping[str, Channel]):
     """Channels by name; the samples of each are read once, on first access.
 
     `read` reads the given channels, one after another; it raises ArchiveError.
     """
 
     def __init__(
-        self, entries: Iterable[NamedT], read: Callable[[Iterable[NamedT]], Iterator[Channel]]
+        self,
+        entries: Iterable[SeriesRecord],
+        read: Callable[[Iterable[SeriesRecord]], Iterator[Channel]],
     ) -> None:
         self._read_from = read
         self._entries = {channel.name: channel for channel in entries}

@@ -5,31 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from campaign.estimate import Estimate, Window
 from campaign.recording import ChannelInfo, Ending, Outcome, Recording
 from campaign.trial import Role, Trial
 
-
-class Samples(Protocol):
-    """Samples of a trial in one archive format."""
-
-    @property
-    def not_kept(self) -> str:
-        """Reason why the samples were left out on purpose; empty if they are present."""
-
-    def recording(self, ending: Ending) -> Recording:
-        """The samples, SI. Raises ArchiveError if a series fails its checksum."""
-
-    def channels(self) -> tuple[ChannelInfo, ...]:
-        """The announced channels. Raises ArchiveError."""
-
-    def digests(self) -> Mapping[str, str]:
-        """SHA-256 of every recorded series, by name, even if its samples were not kept."""
-
-    def problems(self) -> Iterator[str]:
-        """Damage by trial and channel; reads every sample, in constant memory."""
+if TYPE_CHECKING:
+    from campaign.archive.reading.archived_samples import RecordedSamples
 
 
 @dataclass(frozen=True)
@@ -53,7 +36,7 @@ class ArchivedTrial:
     ended: str
     path: Path
     entry: str
-    samples: Samples = field(repr=False)
+    samples: RecordedSamples = field(repr=False)
     windows: tuple[Window, ...] = ()
     estimates: tuple[Estimate, ...] = ()
     measured_by: str = ""

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self, TypeVar
 
+from campaign.archive.layout.entries import TRIAL_FILE
 from campaign.errors import ArchiveError
 
 _Read = TypeVar("_Read")
 
 _ENTRY = re.compile(r"trial_(\d{5,10})(?:_attempt_(\d{1,6}))?(?:/(?:data|preview)/(\w+))?")
-_FILE = re.compile(r"trial-(\d{5,10})(?:-(\d{1,6}))?\.(?:trial|nxs)")
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Damage:
     @classmethod
     def at(cls, place: str, reason: str) -> Self:
         """Damage at a place in the archive; trial and channel follow from the place."""
-        match = _ENTRY.search(place) or _FILE.search(place)
+        match = _ENTRY.search(place) or TRIAL_FILE.search(place)
         if match is None:
             return cls(place, reason)
         number, attempt, *channel = match.groups(default="")

@@ -11,6 +11,7 @@ from pathlib import Path
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.run_reader import RunReader
 from campaign.plain_text import printable
+from campaign.text import count
 
 FILE = "damaged.csv"
 """Name of the list of a run's damage, in a folder exported from the run."""
@@ -29,7 +30,7 @@ def in_words(damage: Damage) -> str:
 
 def heading(path: Path, damaged: Sequence[Damage]) -> str:
     """Statement that a run is damaged, with the number of places."""
-    places = "1 place" if len(damaged) == 1 else f"{len(damaged)} places"
+    places = count(len(damaged), "place")
     return f"{path}: damaged, missing or not as it was archived, in {places}"
 
 

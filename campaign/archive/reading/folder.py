@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
-from campaign.archive.layout.files import why
+from campaign.archive.layout.files import read_errors
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
 from campaign.archive.layout.header import PARTIAL, PlannedTrial, RunStatus
@@ -85,16 +85,12 @@ def _plan_texts(folder: Path) -> tuple[str, str]:
 
 
 def _story(folder: Path, damaged: DamageList) -> Lines:
-    story = read_lines(damaged.read(lambda: _bytes(folder / JOURNAL), b""))
+    content, path = b"", folder / JOURNAL
+    with damaged.noting(), read_errors(path):
+        content = path.read_bytes()
+    story = read_lines(content)
     for number in story.damaged:
         damaged.add(f"{JOURNAL}:{number}", "is not a line of a journal")
     if not story.all(RunStarted) and not damaged.found:
         damaged.add(JOURNAL, "has no line of the start of the run")
     return story
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None

@@ -13,7 +13,7 @@ from campaign.archive.layout.packed_trial import MAGIC, POINTER, PackedSeries, P
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees, series_of
 from campaign.archive.layout.run_folder import first_line
 from campaign.archive.reading import safe_hdf5
-from campaign.archive.reading.series import MISMATCH, layout_of, series_at
+from campaign.archive.reading.series import layout_of, series_at
 from campaign.errors import ArchiveError
 
 
@@ -82,7 +82,7 @@ def packed_record(
 ) -> tuple[TrialRecord, Trees]:
     """Parse record and trees of a trial. Raises ArchiveError if the record lacks the digest."""
     if text_digest(packed.record) != digest:
-        raise ArchiveError(f"{path}: /{entry}/record/json: {MISMATCH}")
+        raise ArchiveError(f"{path}: /{entry}/record/json: {safe_hdf5.MISMATCH}")
     record = parse_record(path, f"/{entry}/record", packed.record)
     try:
         trees = _trees(packed.trees)

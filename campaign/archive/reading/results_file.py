@@ -11,7 +11,6 @@ from pathlib import Path
 import h5py
 from pydantic import ValidationError
 
-from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.results import ENTRY, FORMAT, HASH, RECORD, RunResults
 from campaign.archive.layout.results_text import from_text
 from campaign.archive.layout.run_folder import first_line
@@ -75,9 +74,7 @@ def read_any_results(path: Path) -> RunResults:
         if ENTRY not in safe_hdf5.names(file):
             raise ArchiveError(f"{path}: holds no results")
         entry = safe_hdf5.inner_group(file, ENTRY)
-        digest, place = safe_hdf5.digest_at(entry, HASH)
-        if sha256_of(path, place) != digest:
-            raise ArchiveError(f"{path}: does not match its own hash; it was damaged or changed")
+        safe_hdf5.check_file_hash(entry, HASH)
         _check_format(path, entry)
         return _record(path, entry)
 

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from campaign.archive.layout.files import sha256_of, why
+from campaign.archive.layout.files import read_errors, sha256_of
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
-from campaign.archive.layout.journal_summary import Lines, read_lines
+from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.lazy_trials import LazyTrials, Outline
-from campaign.errors import ArchiveError
 from campaign.recording import SafeState
 from campaign.trial import Tree, Trial
 
 
 @dataclass(frozen=True)
 class Glance:
-    """Facts of a sealed run for `campaign list`. `planned`, `finished` and `failed` count trials,
-    follow-up trials included; `failed` excludes `interrupted` trials, which an operator stopped.
+    """Facts of a run for `campaign list`; counts of trials include follow-up trials.
+
+    Attributes:
+        failed: excludes `interrupted` trials, which an operator stopped.
+        untold: see `RunSummary`.
     """
 
     header: RunHeader
@@ -34,13 +36,7 @@ class Glance:
     finished: int
     failed: int
     interrupted: int
-
-
-def interrupted_trials(status: RunStatus, journal: Callable[[], bytes]) -> int:
-    """Number of stopped trials of a sealed run; reads the journal only if `status` allows any."""
-    if status not in (RunStatus.INTERRUPTED, RunStatus.FAULT):
-        return 0  # the plan was completed
-    return read_lines(journal()).interrupted
+    untold: int = 0
 
 
 @dataclass(frozen=True)
@@ -132,10 +128,8 @@ class RunReader:
         Raises ArchiveError.
         """
         path = self.path if self.sealed else self.path / JOURNAL
-        try:
+        with read_errors(path):
             return sha256_of(path)
-        except OSError as error:
-            raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None
 
     @property
     def identity(self) -> str:
@@ -159,16 +153,6 @@ class RunReader:
         Raises ArchiveError if there is none.
         """
         return self.full_plan.trial(number)
-
-    def unchanged(self) -> bool:
-        """Whether every byte of the sealed file is as written (reads the whole file)."""
-        from campaign.archive.reading import safe_hdf5
-
-        if not self.sealed:
-            return False
-        with safe_hdf5.open_file(self.path) as file:
-            digest, place = safe_hdf5.digest_at(file, "run/outcome/file_sha256")
-        return digest == sha256_of(self.path, place)
 
     def problems(self) -> list[str]:
         """Damage of the run, samples included (reads all of them, in constant memory)."""

@@ -20,15 +20,13 @@ from typing import Any
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
-from numpy.typing import NDArray
 
-from campaign.archive.layout.files import sha256_of_part, why
+from campaign.archive.layout.files import sha256_of, sha256_of_part, why
 from campaign.archive.layout.storage import CHECKSUM, SAMPLE
 from campaign.archive.reading.global_heap_check import heaps_are_sound
 from campaign.errors import ArchiveError
 
-Array = NDArray[np.float64]
-
+MISMATCH = "does not match its checksum; it was damaged or changed"
 _ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
 _LARGEST_ATTRIBUTE = 1 << 16  # bytes
 _TEXT = h5py.string_dtype()
@@ -113,9 +111,9 @@ def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
     """The group `name`, stored in this file, of the NeXus class."""
     group = own(parent, name)
     if not isinstance(group, h5py.Group):
-        raise ArchiveError(f"{_place(parent, name)}: is not a group")
+        raise ArchiveError(f"{place_of(parent, name)}: is not a group")
     if attribute(group, "NX_class") != nx_class:
-        raise ArchiveError(f"{_place(parent, name)}: is not of class {nx_class}")
+        raise ArchiveError(f"{place_of(parent, name)}: is not of class {nx_class}")
     return group
 
 
@@ -123,7 +121,7 @@ def inner_group(parent: h5py.Group, name: str) -> h5py.Group:
     """The group `name`, stored in this file, of any class."""
     group = member(parent, name)
     if group is None:
-        raise ArchiveError(f"{_place(parent, name)}: is not a group")
+        raise ArchiveError(f"{place_of(parent, name)}: is not a group")
     return group
 
 
@@ -133,7 +131,7 @@ def member(parent: h5py.Group, name: str) -> h5py.Group | None:
     if isinstance(item, h5py.Dataset):
         return None
     if not isinstance(item, h5py.Group):
-        raise ArchiveError(f"{_place(parent, name)}: is neither a group nor a dataset")
+        raise ArchiveError(f"{place_of(parent, name)}: is neither a group nor a dataset")
     return item
 
 
@@ -145,7 +143,7 @@ def check_dataset(parent: h5py.Group, name: str) -> int:
     elif dataset.shape == () and dataset.dtype in (np.dtype("<i8"), SAMPLE):
         _check(dataset.id, np.asarray(dataset[()], dtype=dataset.dtype).tobytes())
     else:
-        raise ArchiveError(f"{_place(parent, name)}: is neither a text nor a number")
+        raise ArchiveError(f"{place_of(parent, name)}: is neither a text nor a number")
     return int(dataset.id.get_storage_size())
 
 
@@ -209,9 +207,9 @@ def _text_id(parent: h5py.Group, name: str) -> h5d.DatasetID:
     dataset, plan = _dataset_id(parent, name)
     kind = dataset.dtype
     if dataset.rank or kind.kind != "S" or plan.get_layout() == h5d.CHUNKED:
-        raise ArchiveError(f"{_place(parent, name)}: is not a text of fixed length")
+        raise ArchiveError(f"{place_of(parent, name)}: is not a text of fixed length")
     if dataset.get_storage_size() != kind.itemsize:
-        raise ArchiveError(f"{_place(parent, name)}: is not stored whole")
+        raise ArchiveError(f"{place_of(parent, name)}: is not stored whole")
     return dataset
 
 
@@ -223,15 +221,23 @@ def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:
     dataset = _dataset_at(parent, name)
     offset = dataset.id.get_offset()
     if dataset.shape != () or dataset.dtype != np.dtype("S64") or offset is None:
-        raise ArchiveError(f"{_place(parent, name)}: is not a hash")
+        raise ArchiveError(f"{place_of(parent, name)}: is not a hash")
     return bytes(dataset[()]).decode("ascii", "replace"), (offset, 64)
+
+
+def check_file_hash(parent: h5py.Group, path: str) -> None:
+    """Compare the whole file with its own hash. Raises ArchiveError if it differs."""
+    digest, place = digest_at(parent, path)
+    file = Path(parent.file.filename)
+    if sha256_of(file, place) != digest:
+        raise ArchiveError(f"{file}: does not match its own hash; it was damaged or changed")
 
 
 def integer_at(parent: h5py.Group, name: str, digest: str | None = None) -> int:
     """An integer, checked against the digest of its decimal digits, or its own attribute."""
     dataset = _dataset_at(parent, name)
     if dataset.shape != () or dataset.dtype != np.dtype("<i8"):
-        raise ArchiveError(f"{_place(parent, name)}: is not a 64-bit whole number")
+        raise ArchiveError(f"{place_of(parent, name)}: is not a 64-bit whole number")
     value = np.asarray(dataset[()], dtype="<i8")
     if digest is None:
         _check(dataset.id, value.tobytes())
@@ -299,7 +305,7 @@ def own_id(parent: h5py.Group, name: str) -> Any:
     """As `own`, by HDF5's low-level interface: faster for tens of thousands of objects."""
     raw = name.encode()
     if "/" in name or name == ".":  # of a path, only the last link would be checked
-        raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
+        raise ArchiveError(f"{place_of(parent, name)}: is a path, not a name")
     group = parent.id
     try:
         link = group.links.get_info(raw) if raw else None
@@ -308,9 +314,9 @@ def own_id(parent: h5py.Group, name: str) -> Any:
             raise
         link = None
     if link is None:
-        raise ArchiveError(f"{_place(parent, name)}: is missing")
+        raise ArchiveError(f"{place_of(parent, name)}: is missing")
     if link.type != h5py.h5l.TYPE_HARD:
-        raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
+        raise ArchiveError(f"{place_of(parent, name)}: is a link, and links are not followed")
     return h5o.open(group, raw)
 
 
@@ -322,15 +328,15 @@ def _dataset_id(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, h5py.h5p.
     """A dataset stored in this file, and its creation properties (layout, filters)."""
     dataset = own_id(parent, name)
     if not isinstance(dataset, h5d.DatasetID):
-        raise ArchiveError(f"{_place(parent, name)}: is not a dataset")
+        raise ArchiveError(f"{place_of(parent, name)}: is not a dataset")
     plan = dataset.get_create_plist()
     layout = plan.get_layout()
     if layout == h5d.VIRTUAL or (layout == h5d.CONTIGUOUS and plan.get_external_count()):
-        raise ArchiveError(f"{_place(parent, name)}: lies in another file, which is not opened")
+        raise ArchiveError(f"{place_of(parent, name)}: lies in another file, which is not opened")
     filters = {plan.get_filter(number)[0] for number in range(plan.get_nfilters())}
     if not filters <= _ALLOWED_FILTERS:
         raise ArchiveError(
-            f"{_place(parent, name)}: is stored with a filter other than shuffle and deflate"
+            f"{place_of(parent, name)}: is stored with a filter other than shuffle and deflate"
         )
     return dataset, plan
 
@@ -342,9 +348,7 @@ def _check(dataset: h5d.DatasetID, raw: Any, digest: str | None = None) -> None:
 def _compare(dataset: h5d.DatasetID, found: str, digest: str | None = None) -> None:
     """Raise ArchiveError if `found` differs from `digest`, or from the dataset's attribute."""
     if (_text_attribute(dataset, CHECKSUM) if digest is None else digest) != found:
-        raise ArchiveError(
-            f"{_named(dataset)}: does not match its checksum; it was damaged or changed"
-        )
+        raise ArchiveError(f"{_named(dataset)}: {MISMATCH}")
 
 
 def _named(item: h5g.GroupID | h5d.DatasetID) -> str:
@@ -352,5 +356,6 @@ def _named(item: h5g.GroupID | h5d.DatasetID) -> str:
     return f"{os.fsdecode(h5f.get_name(item))}: {os.fsdecode(h5i.get_name(item))}"
 
 
-def _place(parent: h5py.Group, name: str) -> str:
+def place_of(parent: h5py.Group, name: str) -> str:
+    """File and path of a member of a group, for messages."""
     return f"{parent.file.filename}: {parent.name.rstrip('/')}/{name}"

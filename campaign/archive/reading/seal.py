@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.header import FORMAT
+from campaign.archive.layout.header import FORMAT, ArchivedModel
 from campaign.archive.layout.run_folder import first_line
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.damage import DamageList
@@ -33,10 +33,8 @@ NUMBERS = ("outcome/trials_finished", "outcome/trials_failed", "provenance/forma
 """Members of `/run` that are integers; all others are texts."""
 
 
-class Seal(BaseModel):
+class Seal(ArchivedModel):
     """Digests of a run's texts by their place in `/run`; for a number, of its digits."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True)
 
     format: int
     run: str

@@ -14,13 +14,14 @@ import h5py
 from campaign.archive.layout.entries import entry_name, entry_names, file_name
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
-from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
+from campaign.archive.layout.header import SEALED, PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import RunStarted, TrialFinished
 from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.json_lines import line_places
 from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
-from campaign.archive.layout.run_folder import parse_plan
+from campaign.archive.layout.results import ENDING, ENTRY
+from campaign.archive.layout.run_folder import check_format, parse_plan
 from campaign.archive.layout.storage import storable
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_metrics import with_metrics
@@ -30,7 +31,7 @@ from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.lazy_trials import LazyTrials, Outline
 from campaign.archive.reading.packed_trial_reader import packed_record, parse_record
 from campaign.archive.reading.provenance import read_provenance
-from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
+from campaign.archive.reading.run_reader import Glance, RunReader
 from campaign.archive.reading.seal import SEAL, SealedTexts
 from campaign.errors import ArchiveError
 from campaign.gc_threshold import paused_collection
@@ -39,10 +40,12 @@ from campaign.trial import Tree
 
 NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
 """The texts of `/run` that are notes, without the sources."""
+IMPORT = "; `campaign import` makes one of what other programs recorded"
 
 
 def read_sealed(path: Path) -> RunReader:
     """Read a sealed file of any name; samples are checked only when read."""
+    check_sealed(path)
     damaged = DamageList(path)
     with (
         paused_collection(),
@@ -83,13 +86,16 @@ def read_sealed(path: Path) -> RunReader:
 
 
 def read_glance(path: Path) -> Glance:
-    """Read the summary of a sealed run for a listing."""
+    """Read the summary of a sealed run for a listing. Raises ArchiveError."""
+    check_sealed(path)
     damaged = DamageList(path)
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run"):
         texts = SealedTexts(path, file, damaged)
         header = _header(texts, damaged)
         status = RunStatus(texts.text("outcome/status"))
-        interrupted = interrupted_trials(status, lambda: texts.raw("journal/data"))
+        interrupted = 0
+        if status in (RunStatus.INTERRUPTED, RunStatus.FAULT):  # else the plan was completed
+            interrupted = read_lines(texts.raw("journal/data")).interrupted
         return Glance(
             header=header,
             planned=header.trials + _followed(texts, header),
@@ -99,6 +105,21 @@ def read_glance(path: Path) -> Glance:
             failed=texts.integer("outcome/trials_failed") - interrupted,
             interrupted=interrupted,
         )
+
+
+def check_sealed(path: Path) -> None:
+    """Raise ArchiveError if a file is not a sealed run in a format that this program reads."""
+    with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run/provenance/format"):
+        if ENTRY in file and "run" not in file:
+            run_path = path.with_name(path.name.removesuffix(ENDING) + SEALED)
+            hint = f"; name the run, {run_path}" if run_path.is_file() else ""
+            raise ArchiveError(f"{path}: holds no run but what was found in one{hint}")
+        run = safe_hdf5.member(file, "run")
+        provenance = safe_hdf5.member(run, "provenance") if run is not None else None
+        if provenance is None:
+            raise ArchiveError(f"{path}: /run: is not the archive of a run{IMPORT}")
+        version = safe_hdf5.integer_at(provenance, "format")
+    check_format(path, version)
 
 
 def _followed(texts: SealedTexts, header: RunHeader) -> int:

@@ -16,7 +16,7 @@ from h5py import h5d, h5t
 from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import SeriesDigest, series_digest
 from campaign.archive.layout.packed_trial import PackedSeries, Place
-from campaign.archive.reading.safe_hdf5 import own_id
+from campaign.archive.reading.safe_hdf5 import MISMATCH, own_id, place_of
 from campaign.errors import ArchiveError
 from campaign.recording import Array
 
@@ -78,9 +78,6 @@ class Series:
             raise ArchiveError(f"{self.place()}: {MISMATCH}")
 
 
-MISMATCH = "does not match its checksum; it was damaged or changed"
-
-
 def series_at(
     parent: h5py.Group, name: str, length: int | None = None
 ) -> tuple[h5d.DatasetID, Series]:
@@ -92,19 +89,19 @@ def series_at(
     plan = dataset.get_create_plist() if isinstance(dataset, h5d.DatasetID) else None
     shape: tuple[int, ...] = dataset.shape if plan is not None else ()
     if plan is None or plan.get_layout() != h5d.CHUNKED or len(shape) != 1:
-        raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
+        raise ArchiveError(f"{place_of(parent, name)}: {_NO_SERIES}")
     filters = [plan.get_filter(number)[0] for number in range(plan.get_nfilters())]
     if filters not in (_SHUFFLED, _DEFLATED):
         what = "is stored with a filter other than shuffle and deflate"
-        raise ArchiveError(f"{_place(parent, name)}: {what}")
+        raise ArchiveError(f"{place_of(parent, name)}: {what}")
     (stated,), (chunk,) = shape, plan.get_chunk()
     if not dataset.get_type().equal(h5t.IEEE_F64LE):
-        raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
+        raise ArchiveError(f"{place_of(parent, name)}: {_NO_SERIES}")
     if not 0 < chunk <= storage.LARGEST_CHUNK:
-        raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
+        raise ArchiveError(f"{place_of(parent, name)}: has chunks of {chunk} samples")
     if length is not None and stated != length:
         what = f"has {stated} samples, and {length} were recorded"
-        raise ArchiveError(f"{_place(parent, name)}: {what}")
+        raise ArchiveError(f"{place_of(parent, name)}: {what}")
     return dataset, dataset_series(dataset, parent, name, stated, chunk, filters == _SHUFFLED)
 
 
@@ -117,7 +114,7 @@ def dataset_series(
         skipped, content = dataset.read_direct_chunk((number * chunk,))
         return None if skipped else bytes(content)
 
-    return Series(length, chunk, shuffled, packed, lambda: _place(parent, name))
+    return Series(length, chunk, shuffled, packed, lambda: place_of(parent, name))
 
 
 def file_series(file: BinaryIO, place: str, length: int, stored: PackedSeries) -> Series:
@@ -137,7 +134,3 @@ def layout_of(dataset: h5d.DatasetID) -> tuple[Place, ...]:
     """Place of each chunk of a series in the file: offset and size in bytes."""
     chunks = map(dataset.get_chunk_info, range(dataset.get_num_chunks()))
     return tuple((chunk.byte_offset, chunk.size) for chunk in chunks)
-
-
-def _place(parent: h5py.Group, name: str) -> str:
-    return f"{parent.file.filename}: {parent.name.rstrip('/')}/{name}"

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.archive.layout.followup_trials import planned_in, stages_in
-from campaign.archive.layout.header import PARTIAL, SEALED, RunHeader, RunStatus
+from campaign.archive.layout.header import PARTIAL, SEALED, RunStatus
 from campaign.archive.layout.journal import JOURNAL, RunStarted
 from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.layout.run_folder import read_header
+from campaign.archive.reading.run_reader import Glance
 from campaign.errors import ArchiveError
 
 
@@ -56,9 +57,12 @@ def summarise(path: Path) -> RunSummary:
     try:
         if path.is_dir():
             size = sum(file.stat().st_size for file in path.iterdir())
-            return _summarise_folder(path, size)
-        size = path.stat().st_size
-        return _summarise_file(path, size)
+            run = _glance_at_folder(path)
+        else:
+            from campaign.archive.reading import sealed_run
+
+            size = path.stat().st_size
+            run = sealed_run.read_glance(path)
     except (ArchiveError, OSError) as error:
         sealed = path.with_suffix(SEALED)
         if path.suffix == PARTIAL and sealed.is_file():
@@ -68,66 +72,44 @@ def summarise(path: Path) -> RunSummary:
         return RunSummary(
             path.stem, path, size, problem=f"{error.filename or path}: {error.strerror}"
         )
+    header = run.header
+    benches = (test.get("bench") for test in header.tests)
+    return RunSummary(
+        name=path.stem,
+        path=path,
+        bytes=size,
+        created=header.created,
+        ended=run.ended,
+        status=run.status,
+        title=header.title,
+        protocol=header.protocol_name,
+        backend=header.backend,
+        operator=header.operator,
+        tests=tuple(str(test.get("name", "")) for test in header.tests),
+        benches=tuple(dict.fromkeys(bench for bench in benches if isinstance(bench, str))),
+        tags=header.tags,
+        planned=run.planned,
+        trials=run.finished,
+        failed=run.failed,
+        interrupted=run.interrupted,
+        untold=run.untold,
+    )
 
 
-def _benches(header: RunHeader) -> tuple[str, ...]:
-    named = (test.get("bench") for test in header.tests)
-    return tuple(dict.fromkeys(bench for bench in named if isinstance(bench, str)))
-
-
-def _tests(header: RunHeader) -> tuple[str, ...]:
-    return tuple(str(test.get("name", "")) for test in header.tests)
-
-
-def _summarise_folder(folder: Path, size: int) -> RunSummary:
+def _glance_at_folder(folder: Path) -> Glance:
     header = read_header(folder)
     story = read_lines((folder / JOURNAL).read_bytes())
     if not story.all(RunStarted):
         raise ArchiveError(f"{folder / JOURNAL}: has no line of the start of the run")
     finished, ended = story.finished.values(), story.ended
     planned = header.trials + len(planned_in(stages_in(story.entries)))
-    return RunSummary(
-        name=folder.stem,
-        path=folder,
-        bytes=size,
-        created=header.created,
-        ended=ended.at if ended else "",
-        status=ended.status if ended else RunStatus.INCOMPLETE,
-        title=header.title,
-        protocol=header.protocol_name,
-        backend=header.backend,
-        operator=header.operator,
-        tests=_tests(header),
-        benches=_benches(header),
-        tags=header.tags,
+    return Glance(
+        header=header,
         planned=planned,
-        trials=len(finished),
-        failed=sum(f.outcome.failed for f in finished),
+        status=ended.status if ended else RunStatus.INCOMPLETE,
+        ended=ended.at if ended else "",
+        finished=len(finished),
+        failed=sum(each.outcome.failed for each in finished),
         interrupted=story.interrupted,
         untold=max(0, planned - len(finished)) if story.damaged else 0,
-    )
-
-
-def _summarise_file(path: Path, size: int) -> RunSummary:
-    from campaign.archive.reading import open_run
-
-    run = open_run.read_glance(path)
-    return RunSummary(
-        name=path.stem,
-        path=path,
-        bytes=size,
-        created=run.header.created,
-        ended=run.ended,
-        status=run.status,
-        title=run.header.title,
-        protocol=run.header.protocol_name,
-        backend=run.header.backend,
-        operator=run.header.operator,
-        tests=_tests(run.header),
-        benches=_benches(run.header),
-        tags=run.header.tags,
-        planned=run.planned,
-        trials=run.finished,
-        failed=run.failed,
-        interrupted=run.interrupted,
     )

@@ -13,7 +13,7 @@ from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal import RunStarted, TrialFinished, TrialMeasured
 from campaign.archive.layout.journal_summary import Lines
-from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.layout.record import TrialRecord
 from campaign.archive.reading.damage import DamageList
 from campaign.errors import ArchiveError
 from campaign.trial import Trial, canonical_json
@@ -27,11 +27,9 @@ class TrialFacts:
     """Facts of an archived trial that are compared, without bench and samples.
 
     Attributes:
-        entry: its name in a sealed run, e.g. `trial_00017_attempt_1`.
-        place: its path, for messages.
+        place: path of the trial, for messages.
     """
 
-    entry: str
     place: str
     number: int
     test: str
@@ -43,19 +41,17 @@ class TrialFacts:
     safe_state: str
 
     @classmethod
-    def of(cls, entry: str, place: str, archived: ArchivedTrial, fingerprint: str) -> TrialFacts:
-        trial, ending = archived.trial, archived.ending
+    def of(cls, place: str, record: TrialRecord, fingerprint: str) -> TrialFacts:
         return cls(
-            entry=entry,
             place=place,
-            number=trial.number,
-            test=trial.test,
-            kind=trial.kind,
-            role=trial.role,
+            number=record.number,
+            test=str(record.trial["test"]),
+            kind=str(record.trial["kind"]),
+            role=str(record.trial.get("role", "measurement")),
             fingerprint=fingerprint,
-            outcome=ending.outcome,
-            reason=ending.reason,
-            safe_state=ending.safe_state,
+            outcome=record.outcome,
+            reason=record.reason,
+            safe_state=record.safe_state,
         )
 
 
@@ -63,13 +59,13 @@ def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList
     """Check that all lines are undamaged and that the first line agrees with the header."""
     for number in story.damaged:
         found.add(f"{place}:{number}", "is not a line of a journal")
-    started = story.all(RunStarted)
-    if not started or not isinstance(story.entries[0], RunStarted):
+    started = story.entries[0] if story.entries else None
+    if not isinstance(started, RunStarted):
         found.add(place, "does not begin with the start of a run")
-    elif started[0].run != header.name:
-        found.add(place, f"is of the run {started[0].run!r}, not of {header.name!r}")
-    elif started[0].trials != header.trials:
-        found.add(place, f"states {started[0].trials} trials; {header.trials} are planned")
+    elif started.run != header.name:
+        found.add(place, f"is of the run {started.run!r}, not of {header.name!r}")
+    elif started.trials != header.trials:
+        found.add(place, f"states {started.trials} trials; {header.trials} are planned")
 
 
 def check_measured(story: Lines, place: str, found: DamageList) -> None:

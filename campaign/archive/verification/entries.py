@@ -106,18 +106,7 @@ class EntryCheck:
     def _record(self, place: str, entry: str, record: TrialRecord, trees: Trees) -> None:
         if record.fingerprint_of(trees) != record.fingerprint:
             self.problems.add(f"{place}/record", "does not match its fingerprint")
-        self.executed[entry] = TrialFacts(
-            entry=entry,
-            place=place,
-            number=record.number,
-            test=str(record.trial["test"]),
-            kind=str(record.trial["kind"]),
-            role=str(record.trial.get("role", "measurement")),
-            fingerprint=record.fingerprint,
-            outcome=record.outcome,
-            reason=record.reason,
-            safe_state=record.safe_state,
-        )
+        self.executed[entry] = TrialFacts.of(place, record, record.fingerprint)
         self.unreadable.discard(entry)
 
     def _says(self, group: h5py.Group, record: TrialRecord) -> None:

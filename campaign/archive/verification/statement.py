@@ -6,8 +6,8 @@ from pathlib import Path
 
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.damage import DamageList
-from campaign.archive.reading.open_run import check_sealed
 from campaign.archive.reading.seal import SealedTexts
+from campaign.archive.reading.sealed_run import check_sealed
 from campaign.errors import ArchiveError
 
 

@@ -14,10 +14,9 @@ import h5py
 from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import PART, sha256_of
-from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.journal_summary import Lines, read_lines
-from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
+from campaign.archive.layout.run_folder import HEADER, PLAN
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
@@ -35,6 +34,7 @@ from campaign.archive.verification.result import (
     Progress,
     Verification,
 )
+from campaign.archive.writing.remnants import OWN_FILES
 from campaign.errors import ArchiveError
 
 _HASH = "outcome/file_sha256"
@@ -46,7 +46,6 @@ _REQUIRED = frozenset(
         *(f"{note}/{name}" for note in NOTES for name in ("type", "file_name", "data")),
     ]
 ) - {f"not_kept/{name}" for name in ("type", "file_name", "data")}
-_OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING}
 
 
 def verify_run(path: Path, progress: Progress = lambda count: None) -> Verification:
@@ -92,7 +91,7 @@ class _Check(EntryCheck):
         check_entries(self, entries, self.progress)
         named = {finished.file for finished in story.attempts}
         for file in sorted(self.path.iterdir()):
-            if file.name not in named | _OWN_FILES:
+            if file.name not in named | OWN_FILES:
                 kind = "was never finished" if file.suffix == PART else "is not part of the run"
                 self.remarks.add(file.name, kind)
         self._agreement(run, story, HEADER, JOURNAL, PLAN)
@@ -143,8 +142,9 @@ class _Check(EntryCheck):
         self._outcome(run, story)
 
     def _without_samples(self, archived: ArchivedTrial) -> None:
-        entry, fingerprint = archived.entry, archived.trial.fingerprint
-        self.executed[entry] = TrialFacts.of(entry, f"/{entry}", archived, fingerprint)
+        record, fingerprint = archived.samples.record, archived.trial.fingerprint
+        facts = TrialFacts.of(f"/{archived.entry}", record, fingerprint)
+        self.executed[archived.entry] = facts
 
     def _texts(self, file: h5py.File, texts: SealedTexts) -> None:
         """Check every text of the run against the seal."""

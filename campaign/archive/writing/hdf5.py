@@ -13,7 +13,7 @@ import contextlib
 import hashlib
 import itertools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ import numpy as np
 from h5py import h5a, h5d, h5ds, h5f, h5g, h5p, h5s, h5t
 from numpy.typing import NDArray
 
-from campaign.archive.layout.files import keep_umask
+from campaign.archive.layout.files import keep_umask, sha256_of
 from campaign.archive.layout.storage import (
     CHECKSUM,
     CHUNK,
@@ -34,8 +34,7 @@ from campaign.archive.layout.storage import (
     storable,
 )
 from campaign.archive.writing.long_text import SHORT, LongText
-
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 _MEMORY_FILES = itertools.count(1)
 _STRING = h5py.string_dtype()
@@ -98,13 +97,24 @@ def put_attribute(item: h5py.HLObject, name: str, value: str) -> None:
     attribute.write(np.array(value, dtype=_STRING))
 
 
+def put_attributes(item: h5py.HLObject, attributes: Mapping[str, str]) -> None:
+    """Write text attributes, in their order."""
+    for name, value in attributes.items():
+        put_attribute(item, name, value)
+
+
+def put_root(file: h5py.File, version: str, time: str, default: str) -> None:
+    """Write the attributes of a file's root; `default` is the entry that viewers open first."""
+    root = {"NX_class": "NXroot", "creator": "campaign", "creator_version": version}
+    put_attributes(file, {**root, "file_time": time, **({"default": default} if default else {})})
+
+
 def put_text(group: h5py.Group, name: str, text: str, **attributes: str) -> None:
     """Write a text as a scalar of fixed length, so a reader knows its size before reading it."""
     raw = storable(text).encode("utf-8")
     size = max(1, len(raw))
     dataset = _put_scalar(group, name, _text_kind(size), np.array(raw, dtype=f"S{size}"), raw)
-    for key, value in attributes.items():
-        put_attribute(dataset, key, value)
+    put_attributes(dataset, attributes)
 
 
 def put_integer(group: h5py.Group, name: str, value: int) -> None:
@@ -117,8 +127,7 @@ def put_number(group: h5py.Group, name: str, value: float, **attributes: str) ->
     """Write a number as a 64-bit float scalar."""
     number = np.array(value, dtype=SAMPLE)
     dataset = _put_scalar(group, name, _SAMPLE, number, number.tobytes())
-    for key, text in attributes.items():
-        put_attribute(dataset, key, text)
+    put_attributes(dataset, attributes)
 
 
 def put_series(group: h5py.Group, name: str, values: Array, **attributes: str) -> None:
@@ -126,8 +135,7 @@ def put_series(group: h5py.Group, name: str, values: Array, **attributes: str) -
     samples = np.ascontiguousarray(values, dtype=SAMPLE)
     chunk, shuffled = max(1, min(len(samples), CHUNK)), shuffling_helps(samples)
     dataset = create_series(group, name, len(samples), chunk, shuffled)
-    for key, value in attributes.items():
-        put_attribute(h5py.Dataset(dataset), key, value)
+    put_attributes(h5py.Dataset(dataset), attributes)
     for start in range(0, len(samples), chunk):
         part = samples[start : start + chunk]
         whole = np.concatenate((part, np.zeros(chunk - len(part)))) if len(part) < chunk else part
@@ -138,8 +146,7 @@ def put_texts(group: h5py.Group, name: str, texts: Sequence[str], **attributes: 
     """Write a list of texts of variable length, for other programs: no reader here accepts it."""
     values = np.array([storable(text) for text in texts], dtype=_STRING)
     dataset = group.create_dataset(name, data=values, dtype=_STRING, track_times=False)
-    for key, value in attributes.items():
-        put_attribute(dataset, key, value)
+    put_attributes(dataset, attributes)
 
 
 def _put_scalar(
@@ -190,6 +197,18 @@ def blank_digest(group: h5py.Group, name: str) -> tuple[int, int]:
     dataset = group.create_dataset(name, data=digits, track_times=False)
     group.file.flush()
     return dataset.id.get_offset(), 64
+
+
+def put_file_hash(path: Path, place: tuple[int, int]) -> None:
+    """Write the hash of a closed file at the place from `blank_digest`, whose bytes count as 0.
+
+    It stays in the file, is unaffected by a viewer that opens the file for writing without changes,
+    and detects any changed byte.
+    """
+    digest = sha256_of(path, place)
+    with path.open("r+b") as file:
+        file.seek(place[0])
+        file.write(digest.encode("ascii"))
 
 
 def attach_time(group: h5py.Group, time: str = "time") -> None:

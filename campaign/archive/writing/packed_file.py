@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.archive.layout.checksums import SeriesDigest
 from campaign.archive.layout.files import keep_umask
@@ -20,8 +19,7 @@ from campaign.archive.layout.packed_trial import (
     Place,
 )
 from campaign.archive.layout.storage import CHUNK, SAMPLE, pack, shuffling_helps
-
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 
 class PackedFile:
@@ -104,11 +102,6 @@ class SampleColumns:
     def length(self) -> int:
         """Number of samples appended so far."""
         return self._written + self._filled
-
-    @property
-    def buffered_bytes(self) -> int:
-        """Size of the chunk buffers (bytes); constant."""
-        return self._buffer.nbytes
 
     @property
     def series(self) -> tuple[PackedSeries, ...]:

@@ -19,7 +19,7 @@ from itertools import chain, count
 
 import numpy as np
 
-from campaign.result import Array, Curve, Panel
+from campaign.result import Array, Axis, Column, Curve, Panel
 
 SYMMETRIC = 0.1
 """Largest offset of an interval's center, relative to its half-width, for the form `value ± half`;
@@ -60,7 +60,7 @@ def plots_of(panel: Panel) -> list[Plot]:
     """The plots of a panel, the most important first: viewers open it."""
     alike: dict[tuple[bytes, float], list[Curve]] = {}
     for curve in panel.curves:
-        alike.setdefault((_floats(curve.x).tobytes(), curve.aside), []).append(curve)
+        alike.setdefault((floats(curve.x).tobytes(), curve.aside), []).append(curve)
     bundles: list[list[list[Curve]]] = []  # per plot: groups of curves with one x, side by side
     for curves in alike.values():
         beside = next((b for b in bundles if all(_apart(curves[0], c[0]) for c in b)), None)
@@ -81,9 +81,9 @@ def joined(plot: Plot) -> Curve | None:
         given = [getattr(curve, which) for curve in curves]
         if all(each is None for each in given):
             return None
-        return np.concatenate([[np.nan] if each is None else _floats(each) for each in given])
+        return np.concatenate([[np.nan] if each is None else floats(each) for each in given])
 
-    y = np.concatenate([_floats(curve.y) for curve in curves])
+    y = np.concatenate([floats(curve.y) for curve in curves])
     return Curve(plot.x, y, label="all", style="points", low=ends("low"), high=ends("high"))
 
 
@@ -121,7 +121,7 @@ def _plot(bundle: list[list[Curve]]) -> Plot:
     ]
     placed.sort(key=lambda each: _rank(each[0]))  # stable
     names = names_of([curve.series or curve.label or "curve" for curve, _ in placed])
-    x = np.concatenate([_floats(curves[0].x) for curves in ordered])
+    x = np.concatenate([floats(curves[0].x) for curves in ordered])
     return Plot(
         x, tuple((name, curve, start) for name, (curve, start) in zip(names, placed, strict=True))
     )
@@ -134,7 +134,7 @@ def _background(plot: Plot) -> int:
 def _has_ends(curve: Curve) -> bool:
     """Whether any of its points has an interval, at least on one side."""
     return any(
-        end is not None and np.isfinite(_floats(end)).any() for end in (curve.low, curve.high)
+        end is not None and np.isfinite(floats(end)).any() for end in (curve.low, curve.high)
     )
 
 
@@ -156,17 +156,25 @@ def _apart(one: Curve, other: Curve) -> bool:
 
 
 def _runs_along(curve: Curve) -> bool:
-    x = _floats(curve.x)
+    x = floats(curve.x)
     return len(x) > 0 and bool(np.all(np.diff(x) > 0))
 
 
 def _ends(curve: Curve) -> tuple[float, float]:
-    x = _floats(curve.x)
+    x = floats(curve.x)
     return (float(x[0]), float(x[-1])) if len(x) else (0.0, 0.0)
 
 
-def _floats(values: Array) -> Array:
+def floats(values: Array) -> Array:
+    """Values as float64: a plug-in may use another type or a list."""
     return np.asarray(values, dtype=np.float64)
+
+
+def labels(shown: Axis | Column, more: str = "") -> dict[str, str]:
+    """Attributes of a series along an axis or of a column: name, SI unit, unit for display."""
+    unit = f" ({shown.unit})" if shown.unit else ""
+    units = {"units": shown.unit, "display_units": shown.display or shown.unit} if unit else {}
+    return {"long_name": f"{shown.label}{more}{unit}", **units}
 
 
 def parts_of(curve: Curve) -> Iterator[tuple[str, Array, Array | None]]:
@@ -174,11 +182,11 @@ def parts_of(curve: Curve) -> Iterator[tuple[str, Array, Array | None]]:
     None for a computed array.
     """
     if curve.low is not None and curve.high is not None and _has_ends(curve):
-        low, high = _floats(curve.low), _floats(curve.high)
-        half = half_widths(_floats(curve.y), low, high)
+        low, high = floats(curve.low), floats(curve.high)
+        half = half_widths(floats(curve.y), low, high)
         if half is not None:
             yield "errors", half, None
         yield "low", low, curve.low
         yield "high", high, curve.high
     if curve.y_low is not None:
-        yield "lower_edge", _floats(curve.y_low), curve.y_low
+        yield "lower_edge", floats(curve.y_low), curve.y_low

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.recording import Array
 
 PREVIEW_POINTS = 20_000
 """Largest number of points of a preview: viewers in a browser are slow above about 100 000."""
@@ -23,11 +22,6 @@ class Preview:
         self._most = points // 2
         self._stretch = 1
         self._extremes = np.empty((4, 0))  # time of minimum, minimum, time of maximum, maximum
-
-    @property
-    def stretch(self) -> int:
-        """Samples per pair of points; 1 while every sample is kept."""
-        return self._stretch
 
     def add(self, time: Array, values: Array) -> None:
         """Add samples, both shape (n,)."""

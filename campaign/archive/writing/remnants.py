@@ -7,23 +7,23 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 from pathlib import Path
 
+from campaign.archive.layout.entries import TRIAL_FILE
 from campaign.archive.layout.files import PART, sync_folder
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import PARTIAL, SEALED
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
 
-_OWN = frozenset({HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING})
-_TRIAL_FILE = re.compile(r"trial-[0-9]{5,10}(-[0-9]{1,6})?\.(?:trial|nxs)")
+OWN_FILES = frozenset({HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING})
+"""Names of the files in the folder of a run, without those of trials."""
 
 
 def is_own(name: str) -> bool:
     """Whether `name` is a name of this program's files in the folder of a run."""
     whole = name.removesuffix(PART)
-    return name in _OWN or whole in _OWN or _TRIAL_FILE.fullmatch(whole) is not None
+    return name in OWN_FILES or whole in OWN_FILES or TRIAL_FILE.fullmatch(whole) is not None
 
 
 def remove_folder(folder: Path) -> list[Path]:

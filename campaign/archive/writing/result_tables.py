@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from campaign.archive.writing import hdf5
-from campaign.archive.writing.plots import INTERVAL, half_widths, names_of, unused
+from campaign.archive.writing.plots import INTERVAL, half_widths, labels, names_of, unused
 from campaign.estimate import Estimate
 from campaign.result import Array, Cell, Column, Finding, Table, Value, bare
 from campaign.trial import canonical_json
@@ -84,9 +84,9 @@ def _put_column(
     group: h5py.Group, name: str, column: Column, cells: Sequence[Cell], numeric: bool
 ) -> None:
     if numeric:
-        hdf5.put_series(group, name, _numbers(map(bare, cells)), **_labels(column))
+        hdf5.put_series(group, name, _numbers(map(bare, cells)), **labels(column))
     else:
-        hdf5.put_texts(group, name, [_text(bare(cell)) for cell in cells], **_labels(column))
+        hdf5.put_texts(group, name, [_text(bare(cell)) for cell in cells], **labels(column))
 
 
 def _put_intervals(group: h5py.Group, name: str, column: Column, cells: Sequence[Cell]) -> None:
@@ -99,14 +99,8 @@ def _put_intervals(group: h5py.Group, name: str, column: Column, cells: Sequence
     parts = {"errors": half, "low": low, "high": high}
     for ending, values in parts.items():
         if values is not None and np.isfinite(values).any():
-            attributes = _labels(column, f", {INTERVAL[ending]}")
+            attributes = labels(column, f", {INTERVAL[ending]}")
             hdf5.put_series(group, unused(f"{name}_{ending}", group), values, **attributes)
-
-
-def _labels(column: Column, more: str = "") -> dict[str, str]:
-    unit = f" ({column.unit})" if column.unit else ""
-    units = {"units": column.unit, "display_units": column.display or column.unit}
-    return {"long_name": f"{column.label}{more}{unit}", **(units if unit else {})}
 
 
 def _rank(column: Column, cells: Sequence[Cell], signal: str) -> int:

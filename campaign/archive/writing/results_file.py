@@ -8,15 +8,16 @@ tables can be plotted; viewers open the most important one. This program reads b
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
 
-from campaign.archive.layout.files import PART, publish, sha256_of, why
+from campaign.archive.layout.files import PART, publish, why
 from campaign.archive.layout.results import (
     ENTRY,
     FORMAT,
@@ -32,7 +33,9 @@ from campaign.archive.writing import hdf5
 from campaign.archive.writing.plots import (
     INTERVAL,
     Plot,
+    floats,
     joined,
+    labels,
     names_of,
     parts_of,
     plots_of,
@@ -40,8 +43,9 @@ from campaign.archive.writing.plots import (
 )
 from campaign.archive.writing.result_tables import put_findings, put_table
 from campaign.errors import ArchiveError, UsageError
-from campaign.result import Array, Axis, Curve, Figure, Panel
+from campaign.result import Array, Curve, Figure, Panel, Table
 
+_Keyed = TypeVar("_Keyed", Figure, Table)
 PUBLISHED = "published"
 ARRAYS = "arrays"
 """Arrays of results that are in no plot."""
@@ -59,19 +63,6 @@ def _refuse_foreign(run: Path) -> None:
         )
 
 
-def write_results(run: Path, found: RunResults) -> Path:
-    """Write the results of the run at `run` beside it, completely or not at all; return their path.
-
-    Replaces older results. Raises UsageError if another file is at that path, ArchiveError if the
-    write fails; the existing file then stays unchanged.
-    """
-    prepared = prepare_results(run, found)
-    try:
-        return prepared.publish()
-    finally:
-        prepared.discard()
-
-
 @dataclass(frozen=True)
 class PreparedResults:
     """Results in a temporary file, not valid until published."""
@@ -80,7 +71,7 @@ class PreparedResults:
     path: Path
 
     def publish(self) -> Path:
-        """Move them to the results path, replacing older ones. Raises as `write_results`."""
+        """Move them to the results path, replacing older ones. Raises as `prepare_results`."""
         try:
             publish(self.part, self.path)
         except OSError as error:
@@ -94,17 +85,18 @@ class PreparedResults:
 
 
 def prepare_results(run: Path, found: RunResults) -> PreparedResults:
-    """Write results without replacing any; raises as `write_results`. The caller discards them."""
+    """Write the results of the run at `run`, without replacing any. The caller discards them.
+
+    Raises UsageError if another file is at the results path, ArchiveError if the write fails; the
+    existing file stays unchanged.
+    """
     _refuse_foreign(run)
     path = results_path(run)
     prepared = PreparedResults(path.with_name(f".{path.name}.{os.getpid()}{PART}"), path)
     try:
         with hdf5.closing(hdf5.create_file(prepared.part)) as file:
             place = _Writer(file).write(found)
-        digest = sha256_of(prepared.part, place)
-        with prepared.part.open("r+b") as raw:
-            raw.seek(place[0])
-            raw.write(digest.encode("ascii"))
+        hdf5.put_file_hash(prepared.part, place)
     except OSError as error:
         prepared.discard()
         raise _cannot_be_written(path, error) from None
@@ -127,11 +119,7 @@ class _Writer:
 
     def write(self, found: RunResults) -> tuple[int, int]:
         """Write all content; return the offset and length of the file's hash."""
-        hdf5.put_attribute(self.file, "NX_class", "NXroot")
-        hdf5.put_attribute(self.file, "creator", "campaign")
-        hdf5.put_attribute(self.file, "creator_version", found.version)
-        hdf5.put_attribute(self.file, "file_time", found.date)
-        hdf5.put_attribute(self.file, "default", ENTRY)
+        hdf5.put_root(self.file, found.version, found.date, ENTRY)
         entry = hdf5.make_group(self.file, ENTRY, "NXentry")
         _describe(entry, found)
         names = names_of([*MEMBERS, *(test.name for test in found.tests), PUBLISHED])[
@@ -163,7 +151,7 @@ class _Writer:
             if id(array) not in self.places:
                 others.append(array)
                 name = f"array_{len(others)}"
-                hdf5.put_series(arrays, name, _floats(array).ravel())
+                hdf5.put_series(arrays, name, floats(array).ravel())
                 self.places[id(array)] = f"{ARRAYS}/{name}"
             return self.places[id(array)]
 
@@ -189,16 +177,12 @@ class _Writer:
                 put_findings(process, part, findings)
         figures = {
             figure.key: next(iter(shown), "")
-            for figure, key in zip(
-                result.figures, names_of([each.key for each in result.figures]), strict=True
-            )
+            for key, figure in _named(result.figures)
             if (shown := list(self._figure(process, f"{name}/", f"figure_{key}", figure)))
         }
         tables = [
             f"table_{key}"
-            for table, key in zip(
-                result.tables, names_of([each.key for each in result.tables]), strict=True
-            )
+            for key, table in _named(result.tables)
             if put_table(process, f"table_{key}", table)
         ]
         wanted = found.telling[1] if found.telling and found.telling[0] == test.name else ""
@@ -237,22 +221,22 @@ class _Writer:
         group.attrs[f"{x_name}_indices"] = np.array([0], dtype="<i4")
         _put_scales(group, panel)
         at = "; ".join(f"{place:g}: {name}" for place, name in panel.x.places)
-        hdf5.put_series(group, x_name, plot.x, **_labels(panel.x, f" ({at})" if at else ""))
+        hdf5.put_series(group, x_name, plot.x, **labels(panel.x, f" ({at})" if at else ""))
         if together is not None:
-            hdf5.put_series(group, whole, together.y, **_labels(panel.y))
+            hdf5.put_series(group, whole, together.y, **labels(panel.y))
             for ending, values, _ in parts_of(together):
                 part = f"{whole}_{ending}"
-                hdf5.put_series(group, part, values, **_labels(panel.y, f", {INTERVAL[ending]}"))
+                hdf5.put_series(group, part, values, **labels(panel.y, f", {INTERVAL[ending]}"))
         for own, curve, start in plot.curves:
             cut = _cut(curve, plot, start)
-            attributes = _labels(panel.y, _which(curve, plot))
-            hdf5.put_series(group, own, plot.spread(_floats(curve.y), start), **attributes)
+            attributes = labels(panel.y, _which(curve, plot))
+            hdf5.put_series(group, own, plot.spread(floats(curve.y), start), **attributes)
             self.places[id(curve.x)] = f"{inside}{name}/{x_name}{cut}"
             self.places[id(curve.y)] = f"{inside}{name}/{own}{cut}"
         for own, curve, start in plot.curves:
             for ending, values, array in parts_of(curve):
                 part = unused(f"{own}_{ending}", group)
-                attributes = _labels(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
+                attributes = labels(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
                 hdf5.put_series(group, part, plot.spread(values, start), **attributes)
                 if array is not None:
                     self.places[id(array)] = f"{inside}{name}/{part}{_cut(curve, plot, start)}"
@@ -268,6 +252,11 @@ def _process(
     hdf5.put_text(process, "date", date)
     hdf5.put_integer(process, "sequence_index", number)
     return process
+
+
+def _named(items: Sequence[_Keyed]) -> Iterable[tuple[str, _Keyed]]:
+    """Figures or tables, each with a valid and unique name from its key."""
+    return zip(names_of([each.key for each in items]), items, strict=True)
 
 
 def _note(parent: h5py.Group, name: str, kind: str, text: str) -> None:
@@ -301,13 +290,6 @@ def _put_scales(group: h5py.Group, panel: Panel) -> None:
         hdf5.put_attribute(group, "SILX_style", style)
 
 
-def _labels(axis: Axis, more: str = "") -> dict[str, str]:
-    """Attributes of a series along an axis: name, SI unit, unit for display."""
-    unit = f" ({axis.unit})" if axis.unit else ""
-    units = {"units": axis.unit, "display_units": axis.display or axis.unit} if axis.unit else {}
-    return {"long_name": f"{axis.label}{more}{unit}", **units}
-
-
 def _cut(curve: Curve, plot: Plot, start: int) -> str:
     """Slice of the curve in a series over all of x, as text; empty if it is the whole series."""
     length = len(curve.x)
@@ -323,7 +305,3 @@ def _plottable(curve: Curve) -> bool:
     """Whether all arrays have one value per x; other curves (from plug-ins) are only archived."""
     arrays = (curve.x, curve.y, curve.low, curve.high, curve.y_low)
     return all(each is None or np.shape(each) == (len(curve.x),) for each in arrays)
-
-
-def _floats(values: Array) -> Array:
-    return np.asarray(values, dtype=np.float64)

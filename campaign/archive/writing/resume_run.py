@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from campaign.archive.layout.files import PART, sha256_of, why
+from campaign.archive.layout.files import PART, read_errors, sha256_of, why
 from campaign.archive.layout.header import PARTIAL, SEALED, RunStatus
 from campaign.archive.layout.journal import JOURNAL, Journal
 from campaign.archive.layout.journal_summary import Lines, read_journal
@@ -80,10 +80,8 @@ def _read_folder(folder: Path) -> Lines:
     story = read_journal(folder / JOURNAL)
     for finished in story.attempts:
         path = folder / finished.file
-        try:
+        with read_errors(path):
             digest = sha256_of(path)
-        except OSError as error:
-            raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None
         if digest != finished.sha256:
             raise ArchiveError(f"{path}: is not what the journal says was written")
     for part in folder.glob(f"*{PART}"):

@@ -26,15 +26,8 @@ def reserved_name(results: Path, protocol_stem: str, now: datetime) -> Iterator[
     Raises UsageError if it cannot be written.
     """
     new = not results.exists()
-    try:
-        results.mkdir(parents=True, exist_ok=True)
+    with writable(results):
         lock = _first_lock(results, protocol_stem, now)
-    except (FileExistsError, NotADirectoryError):
-        raise UsageError(f"{results}: is not a folder; choose another --results") from None
-    except OSError as error:
-        raise UsageError(
-            f"{results}: cannot keep results there: {error.strerror}; choose another --results"
-        ) from None
     try:
         yield lock
     finally:
@@ -42,6 +35,23 @@ def reserved_name(results: Path, protocol_stem: str, now: datetime) -> Iterator[
         if new:
             with suppress(OSError):  # it is not empty after the start of a run
                 results.rmdir()
+
+
+@contextmanager
+def writable(results: Path) -> Iterator[None]:
+    """Create the folder `results` if it is missing, for a block that writes in it.
+
+    Raises UsageError if it cannot be written.
+    """
+    try:
+        results.mkdir(parents=True, exist_ok=True)
+        yield
+    except (FileExistsError, NotADirectoryError):
+        raise UsageError(f"{results}: is not a folder; choose another --results") from None
+    except OSError as error:
+        raise UsageError(
+            f"{results}: cannot keep results there: {error.strerror}; choose another --results"
+        ) from None
 
 
 def _first_lock(results: Path, stem: str, now: datetime) -> RunLock:

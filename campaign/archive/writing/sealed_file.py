@@ -122,7 +122,8 @@ class SealedFile:
                     _put(run, f"not_kept/{name}", text, header, rooms)
             digests = {place: _digest(text) for place, text in texts.items()}
             _put(run, SEAL, seal_text(header.name, digests), header, rooms)
-            _write_root(file, header.created, _shown(file, self.placed, folder, story))
+            shown = _shown(file, self.placed, folder, story)
+            hdf5.put_root(file, __version__, header.created, shown)
             self._hash_place = hdf5.blank_digest(run["outcome"], "file_sha256")
         with self._part.open("r+b") as raw:
             for offset, long in rooms.items():
@@ -141,15 +142,8 @@ class SealedFile:
             yield f"{packed.record}\n".encode()
 
     def put_hash(self) -> None:
-        """Write the hash of the whole file into the file.
-
-        The hash counts its own bytes as zeros. It stays in the file, is unaffected by a viewer that
-        opens the file for writing without changes, and detects any changed byte.
-        """
-        digest = sha256_of(self._part, self._hash_place)
-        with self._part.open("r+b") as file:
-            file.seek(self._hash_place[0])
-            file.write(digest.encode("ascii"))
+        """Write the hash of the whole file into the file."""
+        hdf5.put_file_hash(self._part, self._hash_place)
 
     def discard(self) -> None:
         """Close and remove the file."""
@@ -285,20 +279,8 @@ def _by_number(entry: str) -> tuple[int, float]:
     return int(number), int(attempt[1]) if attempt else math.inf
 
 
-def _write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None:
-    """Write the attributes of a file's root; `shown` is the entry that viewers open first."""
-    hdf5.put_attribute(file, "NX_class", "NXroot")
-    hdf5.put_attribute(file, "creator", "campaign")
-    hdf5.put_attribute(file, "creator_version", __version__)
-    hdf5.put_attribute(file, "file_time", created)
-    if shown is not None:
-        hdf5.put_attribute(file, "default", shown.name.lstrip("/"))
-
-
-def _shown(
-    file: h5py.File, placed: Collection[str], folder: Path, story: Lines
-) -> h5py.Group | None:
-    """The entry that a viewer opens first: see `default_plot`."""
+def _shown(file: h5py.File, placed: Collection[str], folder: Path, story: Lines) -> str:
+    """Name of the entry that a viewer opens first: see `default_plot`; empty if there is none."""
     completed = [n for n, each in story.finished.items() if each.outcome is Outcome.COMPLETED]
     with_samples = [
         n
@@ -306,8 +288,8 @@ def _shown(
         if (name := entry_name(n)) in placed and "data" in file[name]
     ]
     if not with_samples:
-        return None
+        return ""
     plan = parse_plan(folder, read_text(folder / PLAN))
     followed = planned_in(stages_in(story.entries))
     best = leading_trial((*plan, *followed), completed, with_samples)
-    return None if best is None else file[entry_name(best)]
+    return "" if best is None else entry_name(best)

@@ -5,20 +5,21 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.archive.layout.checksums import series_digest
 from campaign.archive.layout.entries import entry_name, file_name
 from campaign.archive.layout.files import PART, publish, why
+from campaign.archive.layout.journal import TrialFinished
 from campaign.archive.layout.packed_trial import PackedSeries, PackedTrial
 from campaign.archive.layout.record import (
+    EventRecord,
     PreviewRecord,
     SeriesRecord,
-    make_record,
+    TrialRecord,
+    plain,
     shared_trees,
     trees_text,
 )
@@ -34,36 +35,14 @@ from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import PREVIEW_POINTS, Preview
 from campaign.channels import wrong_names
 from campaign.errors import ArchiveError, BackendError
-from campaign.estimate import Estimate, Window
 from campaign.policy import NotKept
-from campaign.recording import ChannelInfo, Ending, Event
+from campaign.recording import Array, ChannelInfo, Ending, Event
 from campaign.trial import Trial
-
-Array = NDArray[np.float64]
 
 Publish = Callable[[Path, Path], Path]
 """Publishes a file under its final name, at once or later with others; returns its present path."""
 Written = tuple[int, str, list[SeriesRecord]]
 """Length of every series, digest of the time base, and the channels."""
-
-
-@dataclass(frozen=True)
-class FinishedFile:
-    """A complete trial file.
-
-    Attributes:
-        name: the final name of the file.
-        archived: the trial in the file, with the file's present path; a short recording is still
-            in memory.
-        sha256: hash of the file.
-        record: digest of the trial's record.
-    """
-
-    name: str
-    archived: ArchivedTrial
-    sha256: str
-    bytes: int
-    record: str
 
 
 class TrialFile:
@@ -130,14 +109,13 @@ class TrialFile:
         self._events.append(event)
 
     def close(
-        self,
-        ending: Ending,
-        started: str,
-        ended: str,
-        windows: Iterable[Window] = (),
-        estimates: Iterable[Estimate] = (),
-    ) -> FinishedFile:
-        """Write the rest and publish the file."""
+        self, ending: Ending, started: str, ended: str
+    ) -> tuple[TrialFinished, ArchivedTrial]:
+        """Write the rest and publish the file.
+
+        Returns the line for the journal, and the trial at the file's present path; a short
+        recording is still in memory.
+        """
         groups: dict[str, tuple[PackedSeries, ...]] = {}
         if self._rule is not None and self._columns is not None:
             self._not_kept = self._rule(ending)
@@ -145,18 +123,24 @@ class TrialFile:
         with self._writing():
             series, preview = self._finish_samples(groups)
             trial, trees = shared_trees(self._trial)
-            record = make_record(
-                trial,
-                self._trial.label,
-                self._trial.fingerprint,
-                self._attempt,
-                ending,
-                (started, ended),
-                self._events,
-                series=series,
+            samples, time, channels = series or (None, "", [])
+            record = TrialRecord(
+                trial=trial,
+                label=self._trial.label,
+                fingerprint=self._trial.fingerprint,
+                attempt=self._attempt,
+                started=started,
+                ended=ended,
+                outcome=ending.outcome,
+                reason=ending.reason,
+                safe_state=ending.safe_state,
+                fault=ending.fault,
+                telemetry=plain(ending.telemetry),
+                samples=samples,
+                time=time,
+                channels=tuple(channels),
                 preview=preview,
-                windows=windows,
-                estimates=estimates,
+                events=tuple(EventRecord(time=float(e.time), text=e.text) for e in self._events),
             )
             packed = PackedTrial(
                 record=record.text,
@@ -167,12 +151,24 @@ class TrialFile:
             digest, size = self._file.finish(packed)
             path = self._publish(self._part, self._final)
         place = path, entry_name(self._trial.number), record
-        if self._whole is None:
-            samples = PackedSamples(*place, self._not_kept)
-        else:
-            samples = MemorySamples(*place, rows=self._whole)
-        archived = trial_of_record(self._trial, samples)
-        return FinishedFile(self._final.name, archived, digest, size, record.sha256)
+        kept = (
+            PackedSamples(*place, self._not_kept)
+            if self._whole is None
+            else MemorySamples(*place, rows=self._whole)
+        )
+        finished = TrialFinished(
+            at=ended,
+            trial=self._trial.number,
+            attempt=self._attempt,
+            file=self._final.name,
+            sha256=digest,
+            record=record.sha256,
+            bytes=size,
+            outcome=ending.outcome,
+            reason=ending.reason,
+            safe_state=ending.safe_state,
+        )
+        return finished, trial_of_record(self._trial, kept)
 
     def discard(self) -> None:
         """Remove the file. Never fails: by its name, a remaining file is not an archive."""

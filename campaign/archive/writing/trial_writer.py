@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from campaign.archive.layout.files import publish_all, why
 from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished, utc_now
 from campaign.archive.reading.archived_metrics import trial_measured
 from campaign.errors import ArchiveError
-from campaign.estimate import Estimate, Window
 from campaign.policy import KEEP_ALL, NotKept, SampleRetention
-from campaign.recording import ChannelInfo, Ending, Event
+from campaign.recording import Array, ChannelInfo, Ending, Event
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Trial
 
 if TYPE_CHECKING:
     from campaign.archive.reading.archived_metrics import Measure
     from campaign.archive.reading.archived_trial import ArchivedTrial
-    from campaign.archive.writing.trial_file import Publish, TrialFile
-
-Array = NDArray[np.float64]
+    from campaign.archive.writing.trial_file import Publish
 
 
 class FolderWriter:
@@ -54,7 +48,7 @@ class FolderWriter:
             return part
 
         not_kept = keeping.rule(trial, attempt)
-        return TrialWriter.open(self._folder, trial, attempt, note, self._timing, not_kept, publish)
+        return TrialWriter(self._folder, trial, attempt, note, self._timing, not_kept, publish)
 
     def publish(self) -> None:
         """Put the finished trials on the disk. If it raises ArchiveError, none is valid."""
@@ -89,28 +83,14 @@ class TrialWriter:
     """Writer of one trial's recording to a file (a `campaign.recording.Recorder`).
 
     Use it from one thread; several may be open at once. End it with `finish` or `abandon`.
+
+    Attributes:
+        attempt: number of this attempt, from 1.
+        is_open: whether it was neither finished nor abandoned.
     """
 
     def __init__(
         self,
-        trial: Trial,
-        attempt: int,
-        file: TrialFile,
-        note: Callable[[Entry], None],
-        timing: Timing = UNTIMED,
-    ) -> None:
-        """`note` adds a line to the run's journal."""
-        self._trial = trial
-        self._attempt = attempt
-        self._file = file
-        self._note = note
-        self._timing = timing
-        self._open = True
-        self._kept: tuple[TrialFinished, ArchivedTrial] | None = None
-
-    @classmethod
-    def open(
-        cls,
         folder: Path,
         trial: Trial,
         attempt: int,
@@ -118,18 +98,21 @@ class TrialWriter:
         timing: Timing,
         not_kept: NotKept | None = None,
         publish: Publish | None = None,
-    ) -> Self:
-        """Begin the trial's file in the folder of its run; see `RunWriter.begin`."""
+    ) -> None:
+        """Begin the trial's file in the folder of its run; see `RunWriter.begin`.
+
+        `note` adds a line to the run's journal.
+        """
         from campaign.archive.writing.trial_file import TrialFile
 
+        self.attempt = attempt
+        self.is_open = True
+        self._trial = trial
+        self._note = note
+        self._timing = timing
+        self._kept: tuple[TrialFinished, ArchivedTrial] | None = None
         with timing.span(Work.TRIAL_FILES):
-            file = TrialFile(folder, trial, attempt, not_kept, publish)
-        return cls(trial, attempt, file, note, timing)
-
-    @property
-    def attempt(self) -> int:
-        """Number of this attempt, from 1."""
-        return self._attempt
+            self._file = TrialFile(folder, trial, attempt, not_kept, publish)
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
         self._file.start(channels)
@@ -141,19 +124,11 @@ class TrialWriter:
     def event(self, event: Event) -> None:
         self._file.event(event)
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it was neither finished nor abandoned."""
-        return self._open
-
     def finish(
         self,
         ending: Ending,
         started: str,
         ended: str,
-        *,
-        windows: Iterable[Window] = (),
-        estimates: Iterable[Estimate] = (),
     ) -> None:
         """Archive the trial. After the return, no crash can lose it; with a `FolderWriter`, after
         `publish`.
@@ -161,28 +136,15 @@ class TrialWriter:
         Args:
             ending: any ending: a failed trial is archived too.
             started, ended: ISO 8601 with a time zone.
-            windows, estimates: results obtained during the trial, archived with it.
 
         Raises:
             ArchiveError: the file could not be written and was removed.
         """
-        self._open = False
+        self.is_open = False
         with self._timing.span(Work.TRIAL_FILES):
-            file = self._file.close(ending, started, ended, windows, estimates)
-            finished = TrialFinished(
-                at=ended,
-                trial=self._trial.number,
-                attempt=self._attempt,
-                file=file.name,
-                sha256=file.sha256,
-                record=file.record,
-                bytes=file.bytes,
-                outcome=ending.outcome,
-                reason=ending.reason,
-                safe_state=ending.safe_state,
-            )
+            finished, archived = self._file.close(ending, started, ended)
             self._note(finished)
-        self._kept = finished, file.archived
+        self._kept = finished, archived
 
     def measure(self, measure: Measure) -> str:
         """Measure the metrics of the finished trial and add them to the journal.
@@ -212,8 +174,8 @@ class TrialWriter:
 
     def abandon(self, at: str, reason: str = "") -> None:
         """Discard the trial; only its start is noted in the journal."""
-        if not self._open:
+        if not self.is_open:
             return
-        self._open = False
+        self.is_open = False
         self._file.discard()
         self._note(TrialAbandoned(at=at, trial=self._trial.number, reason=reason))

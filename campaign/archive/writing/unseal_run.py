@@ -18,7 +18,6 @@ from campaign.archive.layout.files import (
     PART,
     keep_umask,
     publish,
-    sha256_of,
     sync_folder,
     why,
     write_atomically,
@@ -51,7 +50,8 @@ def unseal(sealed: Path) -> Path:
     folder = sealed.with_suffix(PARTIAL)
     part = folder.with_name(folder.name + PART)
     try:
-        _check_sealed(sealed)
+        with safe_hdf5.open_file(sealed) as file:
+            safe_hdf5.check_file_hash(file, "run/outcome/file_sha256")
         if part.is_dir() and remove_folder(part):
             raise ArchiveError(f"{part}: holds files that are not the program's; move them away")
         keep_umask()
@@ -71,13 +71,6 @@ def unseal(sealed: Path) -> Path:
         ) from None
     sync_folder(folder.parent)
     return folder
-
-
-def _check_sealed(sealed: Path) -> None:
-    with safe_hdf5.open_file(sealed) as file:
-        digest, place = safe_hdf5.digest_at(file, "run/outcome/file_sha256")
-    if sha256_of(sealed, place) != digest:
-        raise ArchiveError(f"{sealed}: does not match its own hash; it was damaged or changed")
 
 
 def _fill(sealed: Path, folder: Path) -> None:

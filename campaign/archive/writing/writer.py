@@ -17,7 +17,6 @@ from campaign.archive.layout.journal import (
     RunResumed,
     TrialFinished,
     TrialMeasured,
-    TrialsFollowed,
     utc_now,
 )
 from campaign.archive.reading.archived_metrics import with_metrics
@@ -25,6 +24,7 @@ from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.writing.new_run_folder import make_folder
 from campaign.archive.writing.resume_run import reopen
 from campaign.archive.writing.run_lock import RunLock
+from campaign.archive.writing.run_names import writable
 from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
@@ -71,8 +71,7 @@ class RunWriter:
             UsageError: the folder cannot be made or written, or has a run of that name.
         """
         folder = results / f"{header.name}{PARTIAL}"
-        try:
-            results.mkdir(parents=True, exist_ok=True)
+        with writable(results):
             lock = lock or RunLock.acquire(results, header.name)
             try:
                 if folder.exists() or folder.with_suffix(SEALED).exists():
@@ -81,12 +80,6 @@ class RunWriter:
             except BaseException:
                 lock.release()
                 raise
-        except (FileExistsError, NotADirectoryError):
-            raise UsageError(f"{results}: is not a folder; choose another --results") from None
-        except OSError as error:
-            raise UsageError(
-                f"{results}: cannot keep results there: {error.strerror}; choose another --results"
-            ) from None
         return cls(folder, journal, lock)
 
     @classmethod
@@ -153,7 +146,7 @@ class RunWriter:
         """
         attempt, note = self.attempt(trial), self.note
         not_kept = keeping.rule(trial, attempt)
-        writer = TrialWriter.open(self._folder, trial, attempt, note, self.timing, not_kept)
+        writer = TrialWriter(self._folder, trial, attempt, note, self.timing, not_kept)
         with self._lock:
             self._writers = [w for w in self._writers if w.is_open] + [writer]
         return writer
@@ -164,15 +157,9 @@ class RunWriter:
             last = self._last.get(trial.number)
         return last.attempt + 1 if last else 1
 
-    def decision(
-        self, decision: str, reason: str, trial: int | None = None, *, at: str = ""
-    ) -> None:
-        """Note a decision outside the plan; `at` is by default the present time."""
-        self.note(Decision(at=at or utc_now(), trial=trial, decision=decision, reason=reason))
-
-    def trials_followed(self, followed: TrialsFollowed) -> None:
-        """Note the trials of a stage, before the first of them begins."""
-        self.note(followed)
+    def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
+        """Note a decision outside the plan."""
+        self.note(Decision(at=utc_now(), trial=trial, decision=decision, reason=reason))
 
     def archived(self, number: int) -> ArchivedTrial:
         """The last finished attempt at a trial of this run, read from its file, with its metrics.
@@ -201,9 +188,9 @@ class RunWriter:
         entry = None if place is None else self._journal.entry(place)
         return entry if isinstance(entry, TrialMeasured) else None
 
-    def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
+    def operator_step(self, trial: int, step: str, answer: str) -> None:
         """Note a step requested from the operator before `trial`, and the answer."""
-        self.note(OperatorStep(at=at or utc_now(), trial=trial, step=step, answer=answer))
+        self.note(OperatorStep(at=utc_now(), trial=trial, step=step, answer=answer))
 
     def seal(
         self,
