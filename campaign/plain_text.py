@@ -6,7 +6,7 @@ import json
 import math
 import unicodedata
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 REPLACEMENT = "?"
 LONGEST = 2000
@@ -45,7 +45,9 @@ def storable(text: object) -> str:
 
 
 def storable_tree(value: object, depth: int = 0) -> Any:
-    """`value` as JSON; other types and deeper levels are replaced by the name of their type."""
+    """`value`, also of numpy, as JSON; other types and deeper levels become the name of their type."""
+    if type(value).__module__ == "numpy":
+        value = cast(Any, value).tolist()
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
     if value is None or (isinstance(value, int) and abs(value) < 2**63):

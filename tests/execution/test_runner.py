@@ -167,6 +167,7 @@ def test_an_ending_of_another_type_is_a_fault(ending: object):
 
 def test_what_execute_says_is_archived_as_plain_text_and_json():
     telemetry = {"bad \ud800": float("nan"), "deep": [{"object": object()}], 3: True}
+    telemetry |= {"counts": np.int64(7), "currents": np.array([1.5, np.inf], dtype=np.float32)}
     ending = Ending(Outcome.FAULT, "a\ud800b\x1b[2J" + "x" * 10_000, telemetry=telemetry)
     bench = Lab(1, FakeBackend({1: lambda stopped: ending}))
     bench.run()
@@ -175,6 +176,7 @@ def test_what_execute_says_is_archived_as_plain_text_and_json():
     assert len(kept.reason) < 2100
     assert kept.telemetry == {
         "bad ?": "nan", "deep": [{"object": "(object, no text)"}], "(int, no text)": True,
+        "counts": 7, "currents": [1.5, "inf"],
     }  # fmt: skip
     json.dumps(kept.telemetry, allow_nan=False).encode()
 
