@@ -45,7 +45,7 @@ def storable(text: object) -> str:
 
 
 def storable_tree(value: object, depth: int = 0) -> Any:
-    """`value`, also of numpy, as JSON; other types and deeper levels become the name of their type."""
+    """`value` as JSON, also of numpy; other types and deeper levels become their type's name."""
     if type(value).__module__ == "numpy":
         value = cast(Any, value).tolist()
     if isinstance(value, float):
