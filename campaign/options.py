@@ -172,7 +172,7 @@ def _docstrings(owner: type) -> Mapping[str, str]:
 
 def _within(found: tuple[Any, ...], prefix: str) -> Iterator[OptionInfo]:
     """The options of all tables that a field accepts."""
-    tables = {word: table for table in _tables(found) for word in [_tag(table)]}
+    tables = {_tag(table): table for table in _tables(found)}
     for choice in found:
         if isinstance(choice, Choice):
             chosen = {f"{choice.tag} = {word}": choice.options(word) for word in choice.words()}
@@ -231,7 +231,7 @@ def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> st
     if chosen:
         plain.append(f"table: {' | '.join(chosen)}")
     if tables:
-        plain.append("table" if len(tables) == 1 else f"table: {_alternatives(tables)}")
+        plain.append("table" if len(tables) == 1 else f"table: {' | '.join(map(_tag, tables))}")
     accepted = " | ".join(dict.fromkeys((*words, *plain)))
     if get_origin(annotation) is dict and not tables and not chosen:
         return f"table of {accepted}"
@@ -243,11 +243,6 @@ def _tables(types: tuple[Any, ...]) -> list[type[BaseModel]]:
     """The table classes among `types`, without repetition."""
     tables = (t for t in types if isinstance(t, type) and issubclass(t, BaseModel))
     return list(dict.fromkeys(tables))
-
-
-def _alternatives(tables: list[type[BaseModel]]) -> str:
-    """The words that identify the tables."""
-    return " | ".join(map(_tag, tables))
 
 
 def _tag(table: type[BaseModel]) -> str:

@@ -11,10 +11,9 @@ from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import JsonValue
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array as Array
 
 
 class Outcome(StrEnum):
@@ -148,15 +147,7 @@ class ChannelInfo:
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
     def with_samples(self, samples: Array) -> Channel:
-        return Channel(
-            self.name,
-            self.unit,
-            self.label,
-            self.display_unit,
-            samples,
-            self.measured,
-            self.own_rate,
-        )
+        return Channel(**vars(self), samples=samples)
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,6 @@ class Stopwatch:
 
     @contextmanager
     def span(self, work: Work) -> Iterator[None]:
-        """See `Timing`."""
         outer: Work | None = getattr(self._thread, "work", None)
         self._begin(work)
         try:
@@ -79,7 +78,6 @@ class Stopwatch:
             self._begin(outer)
 
     def each(self, work: Work, items: Iterable[T]) -> Iterator[T]:
-        """See `Timing`."""
         iterator = iter(items)
         while True:
             with self.span(work):
@@ -90,12 +88,10 @@ class Stopwatch:
             yield item
 
     def add(self, work: Work, processor: float) -> None:
-        """See `Timing`."""
         with self._lock:
             self._spent.setdefault(work, Spent()).processor += processor
 
     def add_worker(self, spent: Mapping[Work, Spent]) -> None:
-        """See `Timing`."""
         with self._lock:
             for work, each in spent.items():
                 own = self._spent.setdefault(work, Spent())
@@ -140,18 +136,16 @@ class NullStopwatch:
     """Measures nothing."""
 
     def span(self, work: Work) -> AbstractContextManager[None]:
-        """See `Timing`."""
         return _NOTHING
 
     def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
-        """See `Timing`."""
         return items
 
     def add(self, work: Work, processor: float) -> None:
-        """See `Timing`."""
+        pass
 
     def add_worker(self, spent: Mapping[Work, Spent]) -> None:
-        """See `Timing`."""
+        pass
 
 
 _NOTHING = nullcontext()
