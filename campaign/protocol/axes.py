@@ -21,7 +21,7 @@ from campaign.protocol.matrix import (
 )
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, find_faults, shown, validate
-from campaign.protocol.schema import Test, TestEntry, replaced
+from campaign.protocol.schema import Test, TestEntry, replaced, with_values
 from campaign.protocol.shapes import Shape
 from campaign.text import nearest
 
@@ -50,7 +50,8 @@ def value_problems(test: Test) -> Iterator[Problem]:
     bench is also due to the value, because the bench is valid without it. A fault elsewhere in the
     options may depend on the whole point, which the plan validates.
     """
-    options, bench = first_point(test)
+    options = with_values(test.options, ((axis, 0) for axis in test.axes if not axis.of_bench))
+    bench = with_values(test.bench, ((axis, 0) for axis in test.axes if axis.of_bench))
     for axis in test.axes:
         yield from _repeated(axis)
         tree = bench if axis.of_bench else options
@@ -76,17 +77,6 @@ def _repeated(axis: Axis) -> Iterator[Problem]:
             message = f"{shown(axis.value(index))} stands there twice; to repeat, use 'repeat'"
             yield axis.value_origin(index).problem((), "value", message)
         seen.add(value)
-
-
-def first_point(test: Test) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Options and bench as written, with the first value of every axis."""
-    options, bench = dict(test.options), dict(test.bench)
-    for axis in test.axes:
-        if axis.of_bench:
-            bench = replaced(bench, axis.keys, axis.value(0))
-        else:
-            options = replaced(options, axis.keys, axis.value(0))
-    return options, bench
 
 
 def is_large(axes: Sequence[Axis], repeat: int) -> bool:

@@ -32,12 +32,10 @@ class _Generator(GenerateJsonSchema):
     """Generator with quantities, choices between tables, and docstrings of fields."""
 
     def function_before_schema(self, schema: Any) -> Tree:
-        """See `GenerateJsonSchema`."""
         owner = getattr(schema["function"]["function"], "__self__", None)
         return _quantity(owner) if isinstance(owner, Quantity) else self._inner(schema["schema"])
 
     def function_plain_schema(self, schema: Any) -> Tree:
-        """See `GenerateJsonSchema`."""
         owner = getattr(schema["function"]["function"], "__self__", None)
         if isinstance(owner, Choice):
             return self._choice(owner)
@@ -54,7 +52,6 @@ class _Generator(GenerateJsonSchema):
         return self._inner(schema["schema"])
 
     def model_schema(self, schema: Any) -> Tree:
-        """See `GenerateJsonSchema`."""
         tree: Tree = super().model_schema(schema)
         model = schema["cls"]
         for name, each in tree.get("properties", {}).items():
