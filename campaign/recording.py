@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 from pydantic import JsonValue
 
 from campaign.arrays import Array as Array
+from campaign.arrays import Flags
 
 
 class Outcome(StrEnum):
@@ -216,6 +218,16 @@ class Recorder(Protocol):
 
     def event(self, event: Event) -> None:
         """Add an event."""
+
+
+def record(recorder: Recorder, time: Array, samples: Array, lost: Flags) -> None:
+    """Add `samples` (channels, n) at `time` (n,); those marked in `lost` (n,) as lost samples."""
+    edges = np.unique([0, *(np.flatnonzero(np.diff(lost)) + 1), len(lost)])
+    for first, end in pairwise(edges):
+        if lost[first]:
+            recorder.lost(time[first:end])
+        else:
+            recorder.append(time[first:end], samples[:, first:end])
 
 
 class MemoryRecorder:

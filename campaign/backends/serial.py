@@ -204,7 +204,7 @@ class SerialBackend:
             self._urgent.clear()
         if self._motion is not None and self._motion.make_safe() is not SafeState.CONFIRMED:
             seen = False
-        return SafeState.CONFIRMED if seen else SafeState.NOT_CONFIRMED
+        return _state(seen)
 
     # One trial
 
@@ -378,15 +378,11 @@ def _fault(fault: Fault, reason: str, safe_state: SafeState) -> Ending:
     return Ending(Outcome.FAULT, reason, safe_state, fault)
 
 
-def _open(options: Options) -> SerialBackend:
-    return SerialBackend(SerialOptions.model_validate(options.model_dump(), context={"si": True}))
-
-
 BACKEND = BackendKind(
     name="serial",
     summary="a servo controller on a serial port or TCP",
     options=SerialOptions,
-    open=_open,
+    open=SerialBackend,
     source=Source.HARDWARE,
     live=True,
     needs=("limits",),

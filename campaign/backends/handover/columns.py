@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from campaign.backends.handover.excitation import axis_of
-from campaign.channels import COMMAND, VOCABULARY, AxisKind, KnownBy, info
+from campaign.axis_kind import AxisKind, sides_in
+from campaign.channels import COMMAND, VOCABULARY, KnownBy, info
 from campaign.errors import Problem, ProtocolError
 from campaign.importing.mapping import Layout, layouts
 from campaign.protocol.files import Source, UnreadableError, read_source
@@ -88,7 +88,7 @@ def first_mapping(trials: Sequence[Trial]) -> str:
 
 def _layout(name: str, mode: str, trials: Sequence[Trial]) -> str:
     required, useful = requested_channels(trials)
-    axis = axis_of(trials[0])
+    axis = sides_in(trials[0].bench).load
     text = f'\n[columns.{name}.time]\ncolumn = "time"\nunit = "s"\n'
     for channel in required:
         text += "\n" + "\n".join(_entry(name, channel, mode, axis)) + "\n"

@@ -12,7 +12,7 @@ import numpy as np
 
 from campaign.axis_kind import in_axis_terms, sides_in
 from campaign.backends.handover.acceptance import GO_ON
-from campaign.backends.handover.excitation import Series, axis_of, shown
+from campaign.backends.handover.excitation import Series, shown
 from campaign.backends.handover.handover_folder import (
     COLUMNS,
     MANIFEST,
@@ -231,7 +231,8 @@ def _channel(trial: Trial, name: str) -> dict[str, str]:
 
 
 def _unit(trial: Trial, name: str) -> str:
-    return info(name, trial.task.mode, axis=axis_of(trial)).unit if name in VOCABULARY else ""
+    axis = sides_in(trial.bench).load
+    return info(name, trial.task.mode, axis=axis).unit if name in VOCABULARY else ""
 
 
 def _row(row: Row, due: str) -> str:
