@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 
@@ -42,14 +42,16 @@ class Spent:
     processor: float = 0.0
 
 
-class Timing(Protocol):
-    """Interface of a stopwatch."""
+class Timing:
+    """A stopwatch that measures nothing; see `Stopwatch`."""
 
     def span(self, work: Work) -> AbstractContextManager[None]:
         """Count the time of this thread inside the block as `work`."""
+        return _NOTHING
 
     def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
         """The same items; the time to get each of them counts as `work`."""
+        return items
 
     def add(self, work: Work, processor: float) -> None:
         """Add processor time (s) of `work` outside all spans."""
@@ -58,7 +60,11 @@ class Timing(Protocol):
         """Add the time of a worker process of this run."""
 
 
-class Stopwatch:
+_NOTHING = nullcontext()
+UNTIMED = Timing()
+
+
+class Stopwatch(Timing):
     """Measures the time by kind of work. Any thread may use it."""
 
     def __init__(self) -> None:
@@ -130,23 +136,3 @@ class Stopwatch:
                     spent.others += clock
                 spent.processor += used - self._thread.used
         self._thread.work, self._thread.now, self._thread.used = work, now, used
-
-
-class NullStopwatch:
-    """Measures nothing."""
-
-    def span(self, work: Work) -> AbstractContextManager[None]:
-        return _NOTHING
-
-    def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
-        return items
-
-    def add(self, work: Work, processor: float) -> None:
-        pass
-
-    def add_worker(self, spent: Mapping[Work, Spent]) -> None:
-        pass
-
-
-_NOTHING = nullcontext()
-UNTIMED = NullStopwatch()

@@ -56,7 +56,7 @@ def value_problems(test: Test) -> Iterator[Problem]:
         yield from _repeated(axis)
         tree = bench if axis.of_bench else options
         model: type[BaseModel] = Bench if axis.of_bench else test.experiment.options
-        for index in _to_check(axis):
+        for index in range(len(axis)) if axis.listed else sorted({0, len(axis) - 1}):
             origin = axis.value_origin(index)
             valid = find_faults(model, replaced(tree, axis.keys, axis.value(index)))
             for keys, aim, message in valid if isinstance(valid, list) else ():
@@ -127,10 +127,3 @@ def _values(written: Any, origin: Origin) -> Sequence[Any] | Range:
         return make_range(entry)
     except ValueError as error:
         return [origin.problem((), "value", str(error))]
-
-
-def _to_check(axis: Axis) -> Iterator[int]:
-    if axis.listed:
-        yield from range(len(axis))
-    else:
-        yield from sorted({0, len(axis) - 1})

@@ -61,28 +61,22 @@ class _Generator(GenerateJsonSchema):
         return tree
 
     def _choice(self, choice: Choice) -> Tree:
-        words = [word for word in choice.words() if choice.options(word) is not None]
+        tables = choice.tables()
         return {
             "type": "object",
             "required": [choice.tag],
-            "properties": {choice.tag: {"enum": words}},
+            "properties": {choice.tag: {"enum": list(tables)}},
             "allOf": [
                 {
                     "if": {"properties": {choice.tag: {"const": word}}, "required": [choice.tag]},
-                    "then": self._inner(_core(choice.options(word))),
+                    "then": self._inner(table.__pydantic_core_schema__),
                 }
-                for word in words
+                for word, table in tables.items()
             ],
         }
 
     def _inner(self, schema: Any) -> Tree:
         return dict(self.generate_inner(schema))
-
-
-def _core(model: type[BaseModel] | None) -> Any:
-    if model is None:
-        raise TypeError("no options")
-    return model.__pydantic_core_schema__
 
 
 def _quantity(quantity: Quantity) -> Tree:
