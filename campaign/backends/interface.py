@@ -22,10 +22,8 @@ class Source(StrEnum):
     RECORDING = "recording"  # an existing recording
 
 
-class StopFlag(Protocol):
-    """Whether one trial is to end early. Each trial has its own flag; any thread may call it."""
-
-    def __call__(self) -> bool: ...
+StopFlag = Callable[[], bool]
+"""Whether one trial is to end early. Each trial has its own flag; any thread may call it."""
 
 
 @runtime_checkable

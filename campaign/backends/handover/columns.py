@@ -72,7 +72,7 @@ def requested_channels(trials: Sequence[Trial]) -> tuple[tuple[str, ...], tuple[
     required = dict.fromkeys((COMMAND, *(name for trial in trials for name in trial.requires)))
     useful = dict.fromkeys(name for trial in trials for name in trial.can_use)
     return tuple(required), tuple(
-        name for name in useful if name not in required and _can_be_recorded(name)
+        name for name in useful if name not in required and can_be_recorded(name)
     )
 
 
@@ -104,5 +104,6 @@ def _entry(layout: str, name: str, mode: str, axis: AxisKind) -> list[str]:
     return [f"[columns.{layout}.{name}]", f'column = "{name}"', f'unit = "{unit or 1}"']
 
 
-def _can_be_recorded(name: str) -> bool:
+def can_be_recorded(name: str) -> bool:
+    """Whether a rig can have a sensor for this channel."""
     return name not in VOCABULARY or VOCABULARY[name].known_by is not KnownBy.SIMULATOR
