@@ -343,10 +343,12 @@ def missing(required: Iterable[str], available: Collection[str]) -> tuple[str, .
     return tuple(name for name in required if name not in available)
 
 
+def meaning_in_sentence(name: str) -> str:
+    """Meaning without capital and full stop; empty if the name is not in the vocabulary."""
+    text = VOCABULARY[name].meaning.removesuffix(".") if name in VOCABULARY else ""
+    return f"{text[:1].lower()}{text[1:]}"
+
+
 def explained(name: str) -> str:
     """Name with its meaning, for messages; only the name if it is not in the vocabulary."""
-    what = VOCABULARY.get(name)
-    if what is None:
-        return name
-    meaning = what.meaning.removesuffix(".")
-    return f"{name} ({meaning[:1].lower()}{meaning[1:]})"
+    return f"{name} ({meaning_in_sentence(name)})" if name in VOCABULARY else name

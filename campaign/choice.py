@@ -52,6 +52,11 @@ class Choice:
         except (KeyError, UsageError):
             return None
 
+    def tables(self) -> dict[str, type[BaseModel]]:
+        """Options class of each usable table, by its word."""
+        tables = {word: self.options(word) for word in self.words()}
+        return {word: table for word, table in tables.items() if table is not None}
+
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:

@@ -17,14 +17,16 @@ from dataclasses import dataclass, replace
 from dataclasses import field as attribute
 from functools import cache
 from itertools import pairwise
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
     GetCoreSchemaHandler,
+    SerializerFunctionWrapHandler,
     ValidationInfo,
+    model_serializer,
 )
 from pydantic_core import PydanticUndefined, core_schema
 
@@ -42,6 +44,24 @@ class Options(BaseModel):
         return frozenset()
 
 
+class LaterOptions(Options):
+    """Options of which some were added later: the normalised tree omits these at their default.
+
+    So older archives keep their fingerprints.
+    """
+
+    later: ClassVar[frozenset[str]] = frozenset()
+    """Names of these options."""
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        tree: dict[str, Any] = dump(self)
+        for name in self.later:
+            if getattr(self, name) == type(self).model_fields[name].default:
+                tree.pop(name, None)
+        return tree
+
+
 def spelled(pattern: str, words: str) -> AfterValidator:
     """Validator of a text that must match the whole `pattern`; `words` describe it to a user."""
 
@@ -51,6 +71,11 @@ def spelled(pattern: str, words: str) -> AfterValidator:
         return text
 
     return AfterValidator(check)
+
+
+def is_archived(info: ValidationInfo) -> bool:
+    """Whether the validated tree is normalised (SI), not as written by a user."""
+    return isinstance(info.context, Mapping) and bool(info.context.get("si"))
 
 
 @dataclass(frozen=True)
@@ -86,7 +111,7 @@ class TextFile:
     def _validate(cls, value: Any, info: ValidationInfo) -> TextFile:
         if isinstance(value, TextFile):
             return value
-        if isinstance(value, str) and isinstance(info.context, Mapping) and info.context.get("si"):
+        if isinstance(value, str) and is_archived(info):
             return cls(value)
         raise ValueError("not the path of a text file, in quotes")
 
@@ -172,11 +197,10 @@ def _docstrings(owner: type) -> Mapping[str, str]:
 
 def _within(found: tuple[Any, ...], prefix: str) -> Iterator[OptionInfo]:
     """The options of all tables that a field accepts."""
-    tables = {word: table for table in _tables(found) for word in [_tag(table)]}
+    tables = {_tag(table): table for table in _tables(found)}
     for choice in found:
         if isinstance(choice, Choice):
-            chosen = {f"{choice.tag} = {word}": choice.options(word) for word in choice.words()}
-            tables |= {label: table for label, table in chosen.items() if table is not None}
+            tables |= {f"{choice.tag} = {word}": one for word, one in choice.tables().items()}
     infos = {label: list(describe(table, prefix)) for label, table in tables.items()}
     for label, of_table in infos.items():
         for info in of_table:
@@ -231,7 +255,7 @@ def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> st
     if chosen:
         plain.append(f"table: {' | '.join(chosen)}")
     if tables:
-        plain.append("table" if len(tables) == 1 else f"table: {_alternatives(tables)}")
+        plain.append("table" if len(tables) == 1 else f"table: {' | '.join(map(_tag, tables))}")
     accepted = " | ".join(dict.fromkeys((*words, *plain)))
     if get_origin(annotation) is dict and not tables and not chosen:
         return f"table of {accepted}"
@@ -243,11 +267,6 @@ def _tables(types: tuple[Any, ...]) -> list[type[BaseModel]]:
     """The table classes among `types`, without repetition."""
     tables = (t for t in types if isinstance(t, type) and issubclass(t, BaseModel))
     return list(dict.fromkeys(tables))
-
-
-def _alternatives(tables: list[type[BaseModel]]) -> str:
-    """The words that identify the tables."""
-    return " | ".join(map(_tag, tables))
 
 
 def _tag(table: type[BaseModel]) -> str:

@@ -75,13 +75,10 @@ class Policy(Options):
 
     def response(self, ending: Ending) -> Response:
         """Response to the ending of a trial that neither completed nor was interrupted."""
-        occasion = str(ending.fault or Fault.OTHER)
+        occasion: Any = ending.fault or Fault.OTHER
         if ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED):
-            occasion = str(ending.outcome)
-        default = self.faults.get("default", Response())
-        return {str(name): response for name, response in self.faults.items()}.get(
-            occasion, default
-        )
+            occasion = ending.outcome
+        return self.faults.get(occasion) or self.faults.get("default") or Response()
 
 
 @dataclass(frozen=True)

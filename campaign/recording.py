@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import JsonValue
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array as Array
+from campaign.arrays import Flags
 
 
 class Outcome(StrEnum):
@@ -148,15 +149,7 @@ class ChannelInfo:
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
     def with_samples(self, samples: Array) -> Channel:
-        return Channel(
-            self.name,
-            self.unit,
-            self.label,
-            self.display_unit,
-            samples,
-            self.measured,
-            self.own_rate,
-        )
+        return Channel(**vars(self), samples=samples)
 
 
 @dataclass(frozen=True)
@@ -225,6 +218,16 @@ class Recorder(Protocol):
 
     def event(self, event: Event) -> None:
         """Add an event."""
+
+
+def record(recorder: Recorder, time: Array, samples: Array, lost: Flags) -> None:
+    """Add `samples` (channels, n) at `time` (n,); those marked in `lost` (n,) as lost samples."""
+    edges = np.unique([0, *(np.flatnonzero(np.diff(lost)) + 1), len(lost)])
+    for first, end in pairwise(edges):
+        if lost[first]:
+            recorder.lost(time[first:end])
+        else:
+            recorder.append(time[first:end], samples[:, first:end])
 
 
 class MemoryRecorder:

@@ -53,8 +53,9 @@ def copy_shipped(destination: Path) -> tuple[Path, ...]:
     }
     taken = [path for path in copies.values() if path.exists()]
     if taken:
+        more = f", and {len(taken) - 1} more of the files" if len(taken) > 1 else ""
         raise UsageError(
-            f"{taken[0]} is there already{_and_more(len(taken) - 1)}; "
+            f"{taken[0]} is there already{more}; "
             "nothing was written: name a new folder, or move the old files away"
         )
     with writing(destination):
@@ -73,7 +74,3 @@ def _shipped_root() -> Path:
             f"the shipped protocols and templates are missing from {root}; install again"
         )
     return root
-
-
-def _and_more(count: int) -> str:
-    return f", and {count} more of the files" if count else ""

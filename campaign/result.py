@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import InstanceOf
 
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Estimate
 from campaign.parameter import NOTHING_IDENTIFIED, IdentifiedRig
 from campaign.reason import NONE, Cause, Reason
 
@@ -114,23 +114,10 @@ class Finding:
         """Estimate with an interval or a reason, also if the analysis gives none."""
         if self.estimate is not None:
             return replace(self.estimate, name=self.quantity)
-        kind: Literal["at least", "number"] = "at least" if self.lower_bound else "number"
-        if not math.isfinite(self.value):
-            return Estimate(
-                self.quantity,
-                math.nan,
-                self.unit,
-                reason=NOT_FOUND(),
-                origin=Origin.NOT_DETERMINED,
-                kind=kind,
-            )
-        return Estimate(
-            self.quantity,
-            self.value,
-            self.unit,
-            reason=NO_INTERVAL(),
-            kind=kind,
-        )
+        kind = "at least" if self.lower_bound else "number"
+        found = math.isfinite(self.value)
+        value, reason = (self.value, NO_INTERVAL()) if found else (math.nan, NOT_FOUND())
+        return Estimate.without_interval(self.quantity, value, self.unit, reason, kind=kind)
 
 
 def bare(cell: Cell) -> Value:

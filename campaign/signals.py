@@ -11,12 +11,10 @@ from functools import cached_property, partial
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from campaign.arrays import Array as Array
 from campaign.options import Options
-
-Array = NDArray[np.float64]
 
 
 class Zero(Options):

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 
@@ -42,14 +42,16 @@ class Spent:
     processor: float = 0.0
 
 
-class Timing(Protocol):
-    """Interface of a stopwatch."""
+class Timing:
+    """A stopwatch that measures nothing; see `Stopwatch`."""
 
     def span(self, work: Work) -> AbstractContextManager[None]:
         """Count the time of this thread inside the block as `work`."""
+        return _NOTHING
 
     def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
         """The same items; the time to get each of them counts as `work`."""
+        return items
 
     def add(self, work: Work, processor: float) -> None:
         """Add processor time (s) of `work` outside all spans."""
@@ -58,7 +60,11 @@ class Timing(Protocol):
         """Add the time of a worker process of this run."""
 
 
-class Stopwatch:
+_NOTHING = nullcontext()
+UNTIMED = Timing()
+
+
+class Stopwatch(Timing):
     """Measures the time by kind of work. Any thread may use it."""
 
     def __init__(self) -> None:
@@ -70,7 +76,6 @@ class Stopwatch:
 
     @contextmanager
     def span(self, work: Work) -> Iterator[None]:
-        """See `Timing`."""
         outer: Work | None = getattr(self._thread, "work", None)
         self._begin(work)
         try:
@@ -79,7 +84,6 @@ class Stopwatch:
             self._begin(outer)
 
     def each(self, work: Work, items: Iterable[T]) -> Iterator[T]:
-        """See `Timing`."""
         iterator = iter(items)
         while True:
             with self.span(work):
@@ -90,12 +94,10 @@ class Stopwatch:
             yield item
 
     def add(self, work: Work, processor: float) -> None:
-        """See `Timing`."""
         with self._lock:
             self._spent.setdefault(work, Spent()).processor += processor
 
     def add_worker(self, spent: Mapping[Work, Spent]) -> None:
-        """See `Timing`."""
         with self._lock:
             for work, each in spent.items():
                 own = self._spent.setdefault(work, Spent())
@@ -134,25 +136,3 @@ class Stopwatch:
                     spent.others += clock
                 spent.processor += used - self._thread.used
         self._thread.work, self._thread.now, self._thread.used = work, now, used
-
-
-class NullStopwatch:
-    """Measures nothing."""
-
-    def span(self, work: Work) -> AbstractContextManager[None]:
-        """See `Timing`."""
-        return _NOTHING
-
-    def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
-        """See `Timing`."""
-        return items
-
-    def add(self, work: Work, processor: float) -> None:
-        """See `Timing`."""
-
-    def add_worker(self, spent: Mapping[Work, Spent]) -> None:
-        """See `Timing`."""
-
-
-_NOTHING = nullcontext()
-UNTIMED = NullStopwatch()

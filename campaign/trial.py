@@ -20,49 +20,22 @@ from pydantic import Field, JsonValue
 from campaign.errors import UsageError
 from campaign.estimate import Window
 from campaign.options import Options
-from campaign.recording import (
-    Array,
-    Channel,
-    ChannelInfo,
-    Ending,
-    Event,
-    Fault,
-    MemoryRecorder,
-    Outcome,
-    PanicStop,
-    Recorder,
-    Recording,
-    SafeState,
-    lost_samples,
-)
-from campaign.signals import Signal, Zero
 
-__all__ = [
-    "NONE_MORE",
-    "Array",
-    "Channel",
-    "ChannelInfo",
-    "Ending",
-    "Event",
-    "Fault",
-    "MemoryRecorder",
-    "Most",
-    "OfferedRecording",
-    "Outcome",
-    "PanicStop",
-    "Recorder",
-    "Recording",
-    "Role",
-    "SafeState",
-    "Task",
-    "Tree",
-    "Trial",
-    "TrialRequest",
-    "canonical_json",
-    "lost_samples",
-    "trial_number",
-]
 # Older plug-ins import the recording classes from here.
+from campaign.recording import Array as Array
+from campaign.recording import Channel as Channel
+from campaign.recording import ChannelInfo as ChannelInfo
+from campaign.recording import Ending as Ending
+from campaign.recording import Event as Event
+from campaign.recording import Fault as Fault
+from campaign.recording import MemoryRecorder as MemoryRecorder
+from campaign.recording import Outcome as Outcome
+from campaign.recording import PanicStop as PanicStop
+from campaign.recording import Recorder as Recorder
+from campaign.recording import Recording as Recording
+from campaign.recording import SafeState as SafeState
+from campaign.recording import lost_samples as lost_samples
+from campaign.signals import Signal, Zero
 
 Tree = dict[str, JsonValue]
 """A normalized, JSON-like description: SI numbers, text, booleans, lists and tables."""

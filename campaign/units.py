@@ -219,7 +219,7 @@ def same_dimension(one: str, other: str) -> bool:
     """Whether both units have the same dimension; unknown units only if their texts are equal."""
     try:
         return one == other or factor(one, other) > 0
-    except (LookupError, ValueError):
+    except ValueError:
         return False
 
 

@@ -50,5 +50,5 @@ def test_what_plug_ins_imported_from_here_is_what_came_back():
         if getattr(thing, "__module__", "") == recording.__name__ and not name.startswith("_")
     }
     assert nouns > {"Recording", "Channel", "Ending", "Outcome", "MemoryRecorder", "lost_samples"}
-    for name in nouns | {"Array"}:
+    for name in (nouns - {"record"}) | {"Array"}:  # `record` came later
         assert getattr(asked, name) is getattr(recording, name)

@@ -377,15 +377,11 @@ class CanopenBackend:
             client.close()
 
 
-def _open(options: Options) -> CanopenBackend:
-    return CanopenBackend(CanopenOptions.model_validate(options.model_dump(), context={"si": True}))
-
-
 BACKEND = BackendKind(
     name="canopen",
     summary="a CiA 402 servo drive on a CAN bus (CANopen)",
     options=CanopenOptions,
-    open=_open,
+    open=CanopenBackend,
     source=Source.HARDWARE,
     live=True,
     needs=("limits",),

@@ -10,11 +10,9 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 from pydantic import Field, JsonValue, field_validator
 
 from campaign.backends.handover import checks
@@ -66,7 +64,7 @@ from campaign.link.refusal import Refusal
 from campaign.options import Options
 from campaign.physics.limit_watch import WATCHED
 from campaign.plain_text import json_text
-from campaign.recording import Ending, Event, Fault, Outcome, Recorder, SafeState
+from campaign.recording import Ending, Event, Fault, Outcome, Recorder, SafeState, record
 from campaign.trial import Trial, canonical_json
 from campaign.units import Time
 
@@ -329,15 +327,11 @@ def _record(recording: ReturnedRecording, recorder: Recorder, stop: StopFlag) ->
     recorder.start(recording.channels)
     for remark in recording.remarks:
         recorder.event(Event(0.0, remark))
-    count = len(recording.time)
-    edges = {0, count, *(np.flatnonzero(np.diff(recording.lost)) + 1), *range(0, count, BLOCK)}
-    for first, end in pairwise(sorted(edges)):
+    for first in range(0, len(recording.time), BLOCK):
         if stop():
             return False
-        if recording.lost[first]:
-            recorder.lost(recording.time[first:end])
-        else:
-            recorder.append(recording.time[first:end], recording.samples[:, first:end])
+        block = slice(first, first + BLOCK)
+        record(recorder, recording.time[block], recording.samples[:, block], recording.lost[block])
     return True
 
 
@@ -364,15 +358,11 @@ def _state(files: Sequence[Path]) -> list[tuple[str, int, int]]:
     return state
 
 
-def _open(options: Options) -> FilesBackend:
-    return FilesBackend(FilesOptions.model_validate(options.model_dump(), context={"si": True}))
-
-
 BACKEND = BackendKind(
     name="files",
     summary="any rig, by hand: exchange of trial and recording files",
     options=FilesOptions,
-    open=_open,
+    open=FilesBackend,
     source=Source.HARDWARE,
     by_hand=True,
     needs=("limits",),

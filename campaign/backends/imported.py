@@ -6,11 +6,8 @@ since the plan was made ends its trial as a fault.
 
 from __future__ import annotations
 
-import itertools
 import threading
 from contextlib import ExitStack
-
-import numpy as np
 
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.importing.description import RecordingDescription
@@ -18,7 +15,7 @@ from campaign.importing.interface import RecordingError
 from campaign.importing.open_files import OpenedFiles
 from campaign.importing.reader import RecordingReader, paths_unchanged
 from campaign.options import Options
-from campaign.recording import Ending, Event, Fault, Outcome, Recorder, SafeState
+from campaign.recording import Ending, Event, Fault, Outcome, Recorder, SafeState, record
 from campaign.trial import Trial
 
 
@@ -59,11 +56,7 @@ class ImportBackend:
             for time, samples, lost in reader.blocks():
                 if stop():
                     return Ending(Outcome.INTERRUPTED, "stopped by the operator")
-                for first, end in _stretches(lost):
-                    if lost[first]:
-                        recorder.lost(time[first:end])
-                    else:
-                        recorder.append(time[first:end], samples[:, first:end])
+                record(recorder, time, samples, lost)
         except RecordingError as error:
             return Ending(Outcome.FAULT, str(error), fault=Fault.OTHER)
         return Ending(Outcome.COMPLETED)
@@ -86,21 +79,11 @@ def _described(trial: Trial) -> RecordingDescription:
     return RecordingDescription.model_validate(trial.recording, context={"si": True})
 
 
-def _stretches(lost: np.ndarray) -> list[tuple[int, int]]:
-    """Begin and end of segments in which all samples are lost, or none."""
-    edges = [0, *(np.flatnonzero(lost[1:] != lost[:-1]) + 1).tolist(), len(lost)]
-    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
-
-
-def _open(options: Options) -> ImportBackend:
-    return ImportBackend()
-
-
 BACKEND = BackendKind(
     name="import",
     summary="existing recordings, described by a mapping",
     options=ImportOptions,
-    open=_open,
+    open=lambda options: ImportBackend(),
     source=Source.RECORDING,
     several=True,
 )

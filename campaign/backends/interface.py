@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from campaign.archive import RunReader
 from campaign.options import Options
@@ -22,10 +22,8 @@ class Source(StrEnum):
     RECORDING = "recording"  # an existing recording
 
 
-class StopFlag(Protocol):
-    """Whether one trial is to end early. Each trial has its own flag; any thread may call it."""
-
-    def __call__(self) -> bool: ...
+StopFlag = Callable[[], bool]
+"""Whether one trial is to end early. Each trial has its own flag; any thread may call it."""
 
 
 @runtime_checkable
@@ -184,7 +182,7 @@ class BackendKind:
 
     Attributes:
         options: class of its options (`--set backend.NAME=...`).
-        open: creates a backend from its options.
+        open: creates a backend from its options, an object of that class.
         source: source of its samples.
         live: whether it moves a bench in wall-clock time: `campaign run` then prompts before the
             first motion, a person confirms operator steps, pauses take their time, and a bench
@@ -204,7 +202,7 @@ class BackendKind:
     name: str
     summary: str
     options: type[Options]
-    open: Callable[[Options], Backend]
+    open: Callable[[Any], Backend]
     source: Source
     live: bool = False
     by_hand: bool = False

@@ -277,9 +277,8 @@ def _text(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _open(options: Options) -> ReplayBackend:
-    chosen = ReplayOptions.model_validate(options.model_dump())
-    return ReplayBackend(open_run(find_run(Path("results"), chosen.run)))
+def _open(options: ReplayOptions) -> ReplayBackend:
+    return ReplayBackend(open_run(find_run(Path("results"), options.run)))
 
 
 BACKEND = BackendKind(

@@ -13,7 +13,6 @@ from pydantic import Field
 
 from campaign.axis_kind import AxisKind, Sides, sides_in
 from campaign.backends.interface import BackendKind, Source, StopFlag
-from campaign.backends.motion import BaseMotion, EmulatedMotion
 from campaign.channels import VOCABULARY, axis_of, info
 from campaign.errors import BackendError, UsageError
 from campaign.link.collect import Collector
@@ -69,7 +68,6 @@ class SerialBackend:
 
     def __init__(self, options: SerialOptions) -> None:
         self._options = options
-        self._motion: BaseMotion | None = EmulatedMotion() if options.motion != "none" else None
         self._refusal = self._new_refusal()
         self._number = new_session()
         self._host = identity("campaign")
@@ -98,7 +96,7 @@ class SerialBackend:
         return self
 
     def _new_refusal(self) -> Refusal:
-        return Refusal(base_motion=self._motion is not None)
+        return Refusal(base_motion=self._options.motion == "emulated")
 
     def __exit__(self, *exception: object) -> None:
         self._disconnect()
@@ -179,9 +177,6 @@ class SerialBackend:
                 return self._execute(session, trial, recorder, stop)
             except LinkFaultError as error:
                 return self._broken_off(session, error)
-            finally:
-                if self._motion is not None:
-                    self._motion.stop()
 
     def make_safe(self) -> SafeState:
         """Send SAFE until the controller confirms it; connect again if necessary.
@@ -202,9 +197,7 @@ class SerialBackend:
             if held:
                 self._busy.release()
             self._urgent.clear()
-        if self._motion is not None and self._motion.make_safe() is not SafeState.CONFIRMED:
-            seen = False
-        return SafeState.CONFIRMED if seen else SafeState.NOT_CONFIRMED
+        return _state(seen)
 
     # One trial
 
@@ -222,8 +215,6 @@ class SerialBackend:
                 )
         except WireError as error:
             raise RefusedError(f"the configuration cannot be sent: {error}") from None
-        if self._motion is not None:
-            self._motion.load(task.base_acceleration, task.duration)
         self._trials += 1
         number = self._trials
         sides = sides_in(trial.bench)
@@ -232,8 +223,6 @@ class SerialBackend:
             session.command(Clear())
             return Ending(Outcome.INTERRUPTED, "stopped by the operator before it moved")
         collector = Collector(session, number, rate, channels, recorder, task.duration)
-        if self._motion is not None:
-            self._motion.trigger()
         try:
             session.start(number)
             ending = collector.run(lambda: stop() or self._urgent.is_set())
@@ -378,15 +367,11 @@ def _fault(fault: Fault, reason: str, safe_state: SafeState) -> Ending:
     return Ending(Outcome.FAULT, reason, safe_state, fault)
 
 
-def _open(options: Options) -> SerialBackend:
-    return SerialBackend(SerialOptions.model_validate(options.model_dump(), context={"si": True}))
-
-
 BACKEND = BackendKind(
     name="serial",
     summary="a servo controller on a serial port or TCP",
     options=SerialOptions,
-    open=_open,
+    open=SerialBackend,
     source=Source.HARDWARE,
     live=True,
     needs=("limits",),

@@ -272,15 +272,11 @@ def _again(options: SimOptions, truths: Mapping[str, Tree], has_blocks: bool) ->
     return backend
 
 
-def _open(options: Options) -> SimBackend:
-    return SimBackend(SimOptions.model_validate(options.model_dump(), context={"si": True}))
-
-
 BACKEND = BackendKind(
     name="sim",
     summary="simulation of the bench",
     options=SimOptions,
-    open=_open,
+    open=SimBackend,
     source=Source.SIMULATION,
     several=True,
     picklable=True,

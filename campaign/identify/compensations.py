@@ -23,7 +23,6 @@ from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Identification, Section
 from campaign.parameter import Parameter
 from campaign.physics.compensation.identified import ENDING, identified_name, stated_name
-from campaign.physics.loop import at_load
 from campaign.trial import leaves
 
 DIGITS = 6
@@ -143,7 +142,7 @@ def _of_observer(sections: Sequence[Section]) -> Iterator[tuple[str, Number]]:
 def _of_friction(key: str, options: Any, found: Identification) -> Iterator[tuple[str, Any]]:
     """Values for the friction model of a compensation, by path within its table."""
     fields = type(options).model_fields
-    if at_load(options, found.bench) != (1.0, 1.0) or not set(CURVE) <= set(fields):
+    if found.bench.at_load(options) != (1.0, 1.0) or not set(CURVE) <= set(fields):
         return
     curve = _curve(found.sections)
     bristles = _bristles(found) if STIFFNESS in fields else Bristles()

@@ -48,7 +48,7 @@ class RecordingReader:
         if described.repairs:
             self._positions = self._even().positions
 
-    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array, Array]]:
+    def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array, np.ndarray]]:
         """Time (n,), samples (channels, n) in the described order, and mask of lost rows (n,)."""
         names = [each.name for each in self.described.channels]
         for first in range(0, self.described.samples, size):

@@ -51,8 +51,7 @@ def with_recordings(protocol: Protocol) -> Iterator[Protocol]:
     and of the plan of the valid recordings.
     """
     problems: list[Problem] = []
-    origin = protocol.origin
-    known = layouts(protocol.columns, origin, problems) if origin is not None else {}
+    known = layouts(protocol.columns, protocol.origin, problems)
     with ExitStack() as stack:
         loader = _Loader(protocol, known, problems, stack)
         tests = tuple(loader.test(test) for test in protocol.tests)
@@ -151,7 +150,7 @@ class _Loader:
             return at.problem(error.keys, "value", str(error))
         name = entry.columns or next(iter(self.layouts))
         keys = ("columns", name, *error.keys[1:])
-        return (self.protocol.origin or at).problem(keys, "key", str(error))
+        return self.protocol.origin.problem(keys, "key", str(error))
 
     def _layout(self, at: Origin, entry: RecordingEntry) -> Layout | None:
         names = list(self.protocol.columns)

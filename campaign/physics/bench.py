@@ -13,17 +13,15 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import (
     Field,
     ModelWrapValidatorHandler,
-    SerializerFunctionWrapHandler,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     field_serializer,
     field_validator,
-    model_serializer,
     model_validator,
 )
 
 from campaign.axis_kind import AxisKind, Sides, axis_terms, sides_in
-from campaign.options import Options
+from campaign.options import LaterOptions, Options, is_archived
 from campaign.physics.bench_knowledge import KnownOptions, known_in_si
 from campaign.physics.bench_paths import wrong_paths
 from campaign.physics.compensation import CompensationField
@@ -55,8 +53,10 @@ from campaign.units import (
 )
 
 
-class AxisOptions(Options):
+class AxisOptions(LaterOptions):
     """The stabilized axis."""
+
+    later = frozenset({"kind"})
 
     name: str
     """Axis of the platform, e.g. azimuth."""
@@ -64,14 +64,6 @@ class AxisOptions(Options):
     """Type of motion. On a linear axis every angle is a position, every torque a force."""
     inertia: Inertia | None = Field(default=None, gt=0)
     """J: inertia of motor, transmission and load, seen at the load."""
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The archived tree of a rotary axis has no `kind`: older fingerprints stay valid."""
-        tree: dict[str, Any] = dump(self)
-        if self.kind == "rotary":
-            tree.pop("kind", None)
-        return tree
 
 
 class MotorOptions(Options):
@@ -159,8 +151,10 @@ CurrentController = Annotated[
 ]
 
 
-class ControllerOptions(Options):
+class ControllerOptions(LaterOptions):
     """The nested loops: rate outside, current inside (Figure 5.3)."""
+
+    later = frozenset({"rate_feedback"})
 
     rate: RateController | None = None
     """The rate (velocity) PI, fed by the gyro."""
@@ -176,14 +170,6 @@ class ControllerOptions(Options):
     """Feedback of the rate loop: the gyro, or the relative rate from the encoder."""
     pointing_high_pass: Frequency = Field(default=0.0, ge=0)
     """Corner of the first-order high-pass of the pointing error; 0 for none."""
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The archived tree of gyro feedback lacks the field: older fingerprints stay valid."""
-        tree: dict[str, Any] = dump(self)
-        if self.rate_feedback == "gyro":
-            tree.pop("rate_feedback", None)
-        return tree
 
     @field_validator("rate_feedback")
     @classmethod
@@ -253,11 +239,6 @@ class LimitsOptions(Options):
         return UNLIMITED if math.isinf(angle) else angle
 
 
-def _archived(info: ValidationInfo) -> bool:
-    """Whether the validated tree is from an archive, not from a bench file."""
-    return isinstance(info.context, Mapping) and bool(info.context.get("si"))
-
-
 class Bench(Options):
     """A platform under test; values may be unknown. `complete` names what a simulation needs."""
 
@@ -304,7 +285,7 @@ class Bench(Options):
     @classmethod
     def _known_in_one_place(cls, tree: Any, info: ValidationInfo) -> Any:
         """The first archives of format 3 have `given` and `fitted` beside `known`."""
-        if not _archived(info) or not isinstance(tree, Mapping):
+        if not is_archived(info) or not isinstance(tree, Mapping):
             return tree
         beside = {name: tree[name] for name in ("given", "fitted") if name in tree}
         rest = {name: value for name, value in tree.items() if name not in beside}
@@ -361,7 +342,9 @@ class Bench(Options):
         if wrong:
             raise invalid(wrong)
         # Archived values are SI, and an experiment's own bench may lack paths of `known`.
-        return bench if _archived(info) else bench.model_copy(update={"known": known_in_si(bench)})
+        if is_archived(info):
+            return bench
+        return bench.model_copy(update={"known": known_in_si(bench)})
 
     @property
     def is_linear(self) -> bool:

@@ -16,16 +16,13 @@ import numpy as np
 from campaign.axis_kind import axis_terms, axis_unit, in_axis_terms
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, control_rate, lacking
-from campaign.physics.friction import friction_models
+from campaign.physics.friction import small_signal_of
 from campaign.physics.limits import worst_friction
-from campaign.physics.loop import at_load
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.plan_loops import loops_of
+from campaign.physics.preload import SLOWEST
 from campaign.physics.resolution import rate_of_one_count
 from campaign.physics.variation import of_its_day
-
-SLOW = 1e-9
-"""rad/s; friction at this rate is friction at the onset of sliding."""
 
 
 @dataclass(frozen=True)
@@ -192,18 +189,17 @@ def _presliding(bench: Bench) -> Iterator[Fact]:
     if count == 0:
         return
     for name, options in bench.friction.items():
-        declared = friction_models()[options.model].small_signal
-        stuck = None if declared is None else declared(options).stuck
+        stuck = small_signal_of(options).stuck
         static = getattr(options, "static_torque", None)
         if stuck is None or stuck.stiffness <= 0 or not static:
             continue
-        span = static / stuck.stiffness / at_load(options, bench)[1]
+        span = static / stuck.stiffness / bench.at_load(options)[1]
         subject = f"one count of the encoder against the presliding Ts/σ0 of '{name}'"
         yield _PRESLIDING(subject, count, span, "rad", "deg")
 
 
 def _torques(bench: Bench) -> Iterator[Fact]:
-    static = worst_friction(bench, SLOW)
+    static = worst_friction(bench, SLOWEST)
     limits, per_ampere = bench.limits, bench.torque_per_current
     if static <= 0 or limits is None:
         return

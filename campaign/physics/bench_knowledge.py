@@ -10,15 +10,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import (
-    BaseModel,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-    model_validator,
-)
+from pydantic import BaseModel, model_validator
 
 from campaign.axis_kind import BOTH_ROTARY
-from campaign.options import Options, spelled
+from campaign.options import LaterOptions, Options, spelled
 from campaign.physics.friction_paths import Keys, invalid
 from campaign.units import Quantity, split_quantity
 
@@ -75,11 +70,13 @@ class IdentifiedOptions(Options):
     """The command."""
 
 
-class KnownOptions(Options):
+class KnownOptions(LaterOptions):
     """Uncertainties of a bench, and the published cells that it is based on.
 
     Cells are named by `table`, `table/row` or `table/row/column`; `*` stands for any name.
     """
+
+    later = frozenset({"identified"})
 
     document: str = ""
     """Source of the cells: "thesis", or a file of published values, relative to the bench."""
@@ -99,14 +96,6 @@ class KnownOptions(Options):
     """Identity of the bench that all of this describes."""
     identified: IdentifiedOptions | None = None
     """Recordings that values were identified from."""
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without identification the archived tree is as before: trials keep their fingerprints."""
-        tree: dict[str, Any] = dump(self)
-        if self.identified is None:
-            tree.pop("identified", None)
-        return tree
 
     @property
     def describes(self) -> bool:

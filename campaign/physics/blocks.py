@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array as Array
 from campaign.physics.compilation import pasted
 from campaign.physics.vector import (
     CACHE_LINE,
@@ -23,8 +24,6 @@ from campaign.physics.vector import (
     number_by_lanes,
     row_of,
 )
-
-Array = NDArray[np.float64]
 
 
 class System(NamedTuple):

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.physics.blocks import Dry, Elements, by_lane, zeros
 from campaign.physics.complete import CompleteBench
 from campaign.physics.equal_interfaces import alike, side_by_side
-from campaign.physics.friction import friction_models
+from campaign.physics.friction import model_of
 from campaign.physics.friction.interface import DryFriction, FrictionOptions
-from campaign.physics.loop import Array, at_load, viscous_at_load
+from campaign.physics.loop import viscous_at_load
 from campaign.physics.rows import (
     ANSWERS,
     ASKED,
@@ -93,8 +94,8 @@ class Interface:
 
         step: s, of its step function.
         """
-        model = friction_models()[options.model]  # type: ignore[attr-defined]
-        torque, rate = at_load(options, bench)
+        model = model_of(options)
+        torque, rate = bench.at_load(options)
         ripple = options.ripple
         parameters = np.asarray(model.parameters(options), dtype=float)
         dry = None

@@ -15,6 +15,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from campaign.physics.friction import model_of
+
 Keys = tuple[str | int, ...]
 EVERY = "*"
 INTERFACE = "interface"
@@ -31,17 +33,13 @@ class Wrong:
 
 def changeable(options: Any) -> tuple[str, ...]:
     """Parameters of an interface that can change: declared by its model and set here."""
-    from campaign.physics.friction import friction_models
-
-    names = friction_models()[options.model].may_change()
+    names = model_of(options).may_change()
     return tuple(name for name in names if getattr(options, name, None) is not None)
 
 
 def torques(options: Any) -> tuple[str, ...]:
     """Those of `changeable` that are torques."""
-    from campaign.physics.friction import friction_models
-
-    names = friction_models()[options.model].torques()
+    names = model_of(options).torques()
     return tuple(name for name in names if getattr(options, name, None) is not None)
 
 

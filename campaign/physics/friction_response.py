@@ -11,17 +11,15 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from campaign.arrays import Array
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete
 from campaign.physics.friction import FrictionField
 from campaign.physics.simulate import FrictionAlong
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task
-
-Array = NDArray[np.float64]
 
 _LOOP = {"form": "parallel", "proportional": 1.0, "integral": 0.0}
 _BARE_BENCH: Mapping[str, Any] = {

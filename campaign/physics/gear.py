@@ -6,22 +6,18 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import (
-    Field,
-    SerializerFunctionWrapHandler,
-    ValidationInfo,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, ValidationInfo, model_validator
 
-from campaign.options import Options
+from campaign.options import LaterOptions, is_archived
 from campaign.physics.friction_paths import invalid
 from campaign.physics.preload import PreloadOptions
 from campaign.units import LEAD, Lead
 
 
-class GearOptions(Options):
+class GearOptions(LaterOptions):
     """The gear between motor and load."""
+
+    later = frozenset({"lead"})
 
     ratio: float = Field(gt=0)
     """N: motor rate over load rate."""
@@ -37,18 +33,10 @@ class GearOptions(Options):
         """Set N = 2 pi / lead, in radians of the motor per meter of the load, from a lead."""
         if not isinstance(tree, Mapping) or tree.get("lead") is None:
             return tree
-        archived = isinstance(info.context, Mapping) and info.context.get("si")
-        if "ratio" in tree and not archived:  # an archived ratio is that of an earlier lead
+        # An archived ratio is that of an earlier lead.
+        if "ratio" in tree and not is_archived(info):
             raise invalid([(("ratio",), "'ratio' follows from 'lead'; remove one of the two")])
         return {**tree, "ratio": _ratio(tree["lead"])}
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The archived tree without a lead lacks the field: older fingerprints stay valid."""
-        tree: dict[str, Any] = dump(self)
-        if self.lead is None:
-            tree.pop("lead", None)
-        return tree
 
 
 def _ratio(lead: Any) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.physics.base_motion import base_rate
 from campaign.physics.blocks import (
     Controller,
@@ -30,7 +31,6 @@ from campaign.physics.friction_elements import (
 )
 from campaign.physics.grid import Grid, make_grid
 from campaign.physics.loop import (
-    Array,
     Loop,
     discretise,
     make_compensator,
@@ -64,8 +64,6 @@ class Lane:
         bench: the simulated bench, with the scatter of this trial.
         stated: source of the numbers in the controller's software: N, Kt, and the design values of
             compensation. It is the same bench, unless the simulation has a separate truth.
-        f, g, h: the discretised loop; see `loop.discretise`. Computed at first use: a plan needs
-            only the step and the structure.
         inputs: inputs that act on the loop, in the order of their signals.
     """
 
@@ -117,20 +115,12 @@ class Lane:
         )
 
     @cached_property
-    def _discrete(self) -> tuple[Array, Array, Array]:
+    def discrete(self) -> tuple[Array, Array, Array]:
+        """The discretised loop F, G, H; see `loop.discretise`.
+
+        Computed at first use: a plan needs only the step and the structure.
+        """
         return discretise(self.loop.a, self.loop.b, self.grid.step)
-
-    @property
-    def f(self) -> Array:
-        return self._discrete[0]
-
-    @property
-    def g(self) -> Array:
-        return self._discrete[1]
-
-    @property
-    def h(self) -> Array:
-        return self._discrete[2]
 
     @property
     def states(self) -> int:
@@ -333,15 +323,17 @@ def _known(lane: Lane, plant: Sequence[int], columns: int, rows: int) -> Array:
     """
     # A disturbance accelerates the load, friction decelerates it: the same input, negative.
     signs = np.array([-1.0 if which == FRICTION else 1.0 for which in plant])
-    at_start, at_end = (lane.g - lane.h)[:, list(plant)] * signs, lane.h[:, list(plant)] * signs
-    held = lane.g[:, [DRIVE]] if lane.grid.per_control else np.zeros((lane.states, 0))
-    known = np.hstack([lane.f, at_start, at_end, held])
+    f, g, h = lane.discrete
+    at_start, at_end = (g - h)[:, list(plant)] * signs, h[:, list(plant)] * signs
+    held = g[:, [DRIVE]] if lane.grid.per_control else np.zeros((lane.states, 0))
+    known = np.hstack([f, at_start, at_end, held])
     return _filled_up(known.T, (columns, rows)).reshape(-1, COLUMNS, rows)
 
 
 def _torque_columns(lane: Lane, which: int, rows: int) -> Array:
     """Effect of a torque line: per N m of its mean, and of its change over the step."""
-    columns = np.stack([lane.g[:, which], lane.h[:, which] - 0.5 * lane.g[:, which]])
+    _, g, h = lane.discrete
+    columns = np.stack([g[:, which], h[:, which] - 0.5 * g[:, which]])
     return _filled_up(columns, (2, rows))
 
 
@@ -363,6 +355,7 @@ def _controller(lanes: Sequence[Lane]) -> Controller:
     sensors = first.bench.sensors.in_order
     noisy = np.cumsum([sensor.noise > 0.0 for sensor in sensors]) - 1
     blocks = [_discrete_block(lane) for lane in lanes]
+    a, b, c, d = (by_lane(matrices) for matrices in zip(*blocks, strict=True))
 
     def each(value: Callable[[Lane], Any]) -> Array:
         return by_lane([value(lane) for lane in lanes])
@@ -389,10 +382,10 @@ def _controller(lanes: Sequence[Lane]) -> Controller:
         ),
         counts=np.any(resolution > 0.0, axis=-1).astype(np.int64),
         resolution=resolution,
-        a=by_lane([block[0] for block in blocks]),
-        b=by_lane([block[1] for block in blocks]),
-        c=by_lane([block[2] for block in blocks]),
-        d=by_lane([block[3] for block in blocks]),
+        a=a,
+        b=b,
+        c=c,
+        d=d,
     )
 
 

@@ -31,13 +31,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, in_axis_terms
 from campaign.physics.bench import LimitsOptions
 from campaign.units import in_words
-
-Array = NDArray[np.float64]
 
 SHARE = 0.01
 """Share of the angle limit; at the rate limit it gives the longest averaging time of the rate. The

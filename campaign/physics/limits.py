@@ -13,15 +13,16 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.axis_kind import axis_unit
 from campaign.physics.bench import Bench
 from campaign.physics.complete import lacking, limits_of
+from campaign.physics.friction import model_of
+from campaign.physics.variation import of_its_day
 from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
 from campaign.trial import Task
 
-Array = NDArray[np.float64]
 Limit = Literal["angle", "rate", "acceleration", "torque", "current", "duration"]
 
 TINY_RATE = 1e-6
@@ -185,12 +186,9 @@ def worst_friction(bench: Bench, rate: float) -> float:
     and the viscous part at `rate`; in the worse direction and at the worst position, on the bench's
     day and under its preload. Torques at the motor count N times.
     """
-    from campaign.physics.friction import friction_models
-    from campaign.physics.variation import of_its_day
-
     total = 0.0
     for friction in of_its_day(bench).friction.values():
-        model = friction_models()[friction.model]
+        model = model_of(friction)
         ratio, rate_ratio = bench.at_load(friction)
         speed = rate * rate_ratio
         speeds = _SHARES * speed

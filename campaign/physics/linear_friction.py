@@ -14,9 +14,9 @@ from typing import Literal
 
 from campaign.physics.compensation.interface import Compensator
 from campaign.physics.complete import CompleteBench
-from campaign.physics.friction import friction_models
-from campaign.physics.friction.interface import FrictionModel, FrictionOptions, Presliding
-from campaign.physics.loop import at_load, viscous_at_load
+from campaign.physics.friction import model_of, small_signal_of
+from campaign.physics.friction.interface import FrictionOptions, Presliding, SmallSignal
+from campaign.physics.loop import viscous_at_load
 
 Regime = Literal["stuck", "sliding"]
 REGIMES: tuple[Regime, ...] = ("stuck", "sliding")
@@ -71,7 +71,7 @@ def compensation_friction(
 def _path(
     options: FrictionOptions, bench: CompleteBench, own: Presliding, gain: float
 ) -> FrictionPath:
-    torque, rate = at_load(options, bench)
+    torque, rate = bench.at_load(options)
     scale = gain * torque * rate
     return FrictionPath(
         stiffness=scale * own.stiffness,
@@ -82,33 +82,24 @@ def _path(
 
 
 def _in_plant(name: str, options: FrictionOptions, regime: Regime) -> Presliding:
-    model = _model(options)
-    if regime == "sliding":
-        return _sliding(model, options)
-    if model.small_signal is None:
-        raise NoLoopError(f"the friction model '{model.name}' does not declare its presliding")
-    stuck = model.small_signal(options).stuck
+    stuck = _own(options, regime).stuck
     if stuck is None:
         raise NoLoopError(f"friction.{name} is dry: stuck, it holds the load rigidly")
     return stuck
 
 
 def _as_compensation(options: FrictionOptions, regime: Regime) -> Presliding:
-    model = _model(options)
-    if regime == "sliding":
-        return _sliding(model, options)
-    if model.small_signal is None:
-        raise NoLoopError(f"the friction model '{model.name}' does not declare its presliding")
-    stuck = model.small_signal(options).stuck_compensation
+    stuck = _own(options, regime).stuck_compensation
     if stuck is None:
         raise NoLoopError("the compensation's torque jumps with the sign of the rate")
     return stuck
 
 
-def _sliding(model: FrictionModel, options: FrictionOptions) -> Presliding:
-    damping = 0.0 if model.small_signal is None else model.small_signal(options).sliding_damping
-    return Presliding(0.0, damping)
-
-
-def _model(options: FrictionOptions) -> FrictionModel:
-    return friction_models()[options.model]  # type: ignore[attr-defined]
+def _own(options: FrictionOptions, regime: Regime) -> SmallSignal:
+    """Response of an interface; in sliding it has the damping of sliding, and no spring."""
+    if regime == "sliding":
+        return SmallSignal.of_bristles(0.0, small_signal_of(options).sliding_damping)
+    model = model_of(options)
+    if model.small_signal is None:
+        raise NoLoopError(f"the friction model '{model.name}' does not declare its presliding")
+    return model.small_signal(options)

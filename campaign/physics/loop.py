@@ -19,13 +19,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.physics.bench import AppendageOptions, Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.compensation.interface import Compensator, LinearBlock
 from campaign.physics.complete import CompleteBench
-from campaign.physics.friction import friction_models
+from campaign.physics.friction import model_of
 from campaign.physics.friction.interface import FrictionOptions
 from campaign.physics.rows import (
     ANGLE,
@@ -42,8 +42,6 @@ from campaign.physics.rows import (
     RATE,
     RELATIVE_ANGLE,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -73,16 +71,10 @@ def make_compensator(bench: CompleteBench, name: str) -> Compensator:
     return method.build(options, bench.axis.inertia, bench.gear.ratio)
 
 
-def at_load(friction: FrictionOptions, bench: Bench) -> tuple[float, float]:
-    """Torque at the load per N m of this interface, and its rate per load relative rate."""
-    return bench.at_load(friction)
-
-
 def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
     """Viscous friction of one interface at the load (N m s/rad)."""
-    torque, rate = at_load(friction, bench)
-    model = friction_models()[friction.model]  # type: ignore[attr-defined]
-    return model.viscous(friction) * torque * rate
+    torque, rate = bench.at_load(friction)
+    return model_of(friction).viscous(friction) * torque * rate
 
 
 def make_loop(

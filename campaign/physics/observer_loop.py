@@ -18,13 +18,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import ComplexArray
 from campaign.physics.complete import CompleteBench
 from campaign.signals import Array
 
-Complex = NDArray[Any]
-"""complex128"""
 TWO_PI = 2.0 * np.pi
 
 
@@ -40,7 +38,7 @@ def gain_for(bench: CompleteBench, corner: float, inertia: float | None = None) 
 
 def rejection(
     bench: CompleteBench, corner: float, inertia: float | None, frequency: Array
-) -> Complex:
+) -> ComplexArray:
     """Rejection w / Td (rad/s per N m) at `frequency` (Hz), shape (n,); corner 0: no observer."""
     s = 2j * np.pi * frequency
     return np.asarray(1.0 / (bench.axis.inertia * s + _controller(bench, corner, inertia, s)))
@@ -48,7 +46,7 @@ def rejection(
 
 def noise_coupling(
     bench: CompleteBench, corner: float, inertia: float | None, frequency: Array
-) -> Complex:
+) -> ComplexArray:
     """Noise coupling w / n at `frequency` (Hz), shape (n,)."""
     s = 2j * np.pi * frequency
     controller = _controller(bench, corner, inertia, s)

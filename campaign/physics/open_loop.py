@@ -144,13 +144,7 @@ class _Sampled:
         )
         self.period = 1.0 / float(bench.controller.sample_rate or 1.0)
         self.sensor_delays = [
-            round(sensor.delay / self.period)
-            for sensor in (
-                bench.sensors.gyro,
-                bench.sensors.encoder,
-                bench.sensors.resolver,
-                bench.sensors.current,
-            )
+            round(sensor.delay / self.period) for sensor in bench.sensors.in_order
         ]
         delay = bench.controller.delay / self.period
         self.late_output = math.floor(delay + 1e-9)

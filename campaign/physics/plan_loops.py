@@ -67,23 +67,16 @@ def loops_of(
     bench: Bench, compensation: str, mode: Mode
 ) -> Iterator[tuple[Regime, LoopMargins | NoLoopError]]:
     """Each regime with its LoopMargins, or with a NoLoopError that states the reason."""
-    try:
-        bench = complete(bench, "a loop's margin")
-    except IncompleteBenchError as error:
-        yield from ((regime, NoLoopError(str(error))) for regime in REGIMES)
-        return
-    yield from _loops(bench, compensation, mode)
-
-
-def _loops(
-    bench: CompleteBench, compensation: str, mode: Mode
-) -> Iterator[tuple[Regime, LoopMargins | NoLoopError]]:
     for regime in REGIMES:
         try:
+            whole = complete(bench, "a loop's margin")
             with np.errstate(all="ignore"):
-                yield regime, margins_of(open_loop(bench, compensation, mode, regime))
+                margins = margins_of(open_loop(whole, compensation, mode, regime))
+            yield regime, margins
         except NoLoopError as error:
             yield regime, error
+        except IncompleteBenchError as error:
+            yield regime, NoLoopError(str(error))
         except (ValueError, ArithmeticError):  # a matrix with infinite values has no poles
             yield regime, NoLoopError("its numbers are beyond computing")
 
@@ -117,8 +110,6 @@ def _values(bench: CompleteBench, compensation: str, mode: Mode) -> Hashable:
     bench = of_its_day(bench)
     compensator = make_compensator(bench, compensation)
     block = compensator.linear
-    sensors = bench.sensors
-    delays = (sensors.gyro, sensors.encoder, sensors.resolver, sensors.current)
     friction: list[Hashable] = []
     for regime in REGIMES:
         try:
@@ -134,7 +125,7 @@ def _values(bench: CompleteBench, compensation: str, mode: Mode) -> Hashable:
         bench.motor,
         bench.gear.ratio,
         bench.controller,
-        tuple(sensor.delay for sensor in delays),
+        tuple(sensor.delay for sensor in bench.sensors.in_order),
         tuple(friction),
         None if block is None else tuple(x.tobytes() for x in (block.a, block.b, block.c, block.d)),
     )

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from campaign.options import Options
+from campaign.physics.friction import model_of
 from campaign.physics.friction_paths import (
     INTERFACE,
     Wrong,
@@ -24,7 +25,8 @@ from campaign.physics.friction_paths import (
 from campaign.units import Torque, torque_text
 
 SLOWEST = 1e-9
-"""rad/s; friction at this rate is the breakaway torque of an interface without static torque."""
+"""rad/s; friction at this rate is that of the onset of sliding, and the breakaway torque of an
+interface without static torque."""
 
 Share = Annotated[float, Field(ge=0, le=2)]
 
@@ -34,12 +36,15 @@ def _kind(value: Any) -> str:
     return INTERFACE if isinstance(value, Mapping) else "share"
 
 
-Shares = dict[
-    str,
-    Annotated[
-        Annotated[Share, Tag("share")] | Annotated[dict[str, Share], Tag(INTERFACE)],
-        Discriminator(_kind),
+Shares = Annotated[
+    dict[
+        str,
+        Annotated[
+            Annotated[Share, Tag("share")] | Annotated[dict[str, Share], Tag(INTERFACE)],
+            Discriminator(_kind),
+        ],
     ],
+    BeforeValidator(nested),
 ]
 
 
@@ -53,11 +58,6 @@ class PreloadOptions(Options):
     shares: Shares = {"static_torque": 1.0}
     """Share of the difference that is added to a torque, seen at the load, by its path:
     `static_torque` of all preloaded interfaces together, or `mesh.static_torque`."""
-
-    @field_validator("shares", mode="before")
-    @classmethod
-    def _nested(cls, shares: Any) -> Any:
-        return nested(shares)
 
     @property
     def by_path(self) -> dict[str, float]:
@@ -128,11 +128,9 @@ def _loaded(friction: Mapping[str, Any]) -> dict[str, Any]:
 
 def _breakaway(options: Any) -> float:
     """Breakaway torque of an interface (N m at the interface)."""
-    from campaign.physics.friction import friction_models
-
     if "static_torque" in torques(options):
         return float(options.static_torque)
-    steady = friction_models()[options.model].steady_state(options, np.array([SLOWEST]))
+    steady = model_of(options).steady_state(options, np.array([SLOWEST]))
     return abs(float(steady[0]))
 
 

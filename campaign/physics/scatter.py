@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import (
+    BeforeValidator,
     Discriminator,
     Field,
     SerializerFunctionWrapHandler,
@@ -90,12 +91,15 @@ def _kind(value: Any) -> str:
     return "Scatter"
 
 
-Scatters = dict[
-    str,
-    Annotated[
-        Annotated[Scatter, Tag("Scatter")] | Annotated[dict[str, Scatter], Tag(INTERFACE)],
-        Discriminator(_kind),
+Scatters = Annotated[
+    dict[
+        str,
+        Annotated[
+            Annotated[Scatter, Tag("Scatter")] | Annotated[dict[str, Scatter], Tag(INTERFACE)],
+            Discriminator(_kind),
+        ],
     ],
+    BeforeValidator(nested),
 ]
 
 
@@ -111,11 +115,6 @@ class VariationOptions(Options):
     `load.coulomb_torque`: a relative standard deviation, or a table."""
     trial_to_trial: Scatters = {}
     """Scatter from trial to trial, in the same form."""
-
-    @field_validator("day_to_day", "trial_to_trial", mode="before")
-    @classmethod
-    def _nested(cls, table: Any) -> Any:
-        return nested(table)
 
     @property
     def days(self) -> tuple[Line, ...]:

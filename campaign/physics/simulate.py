@@ -11,18 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.physics.blocks import zeros
 from campaign.physics.complete import CompleteBench
 from campaign.physics.engine import advance_block, advance_one
-from campaign.physics.grid import Grid, make_grid
+from campaign.physics.grid import Grid
 from campaign.physics.lanes import Lane, Lanes, together
-from campaign.physics.loop import Array
 from campaign.physics.prescribed_motion import drive_block, drive_one
 from campaign.physics.rows import OUT_FRICTION, OUTPUTS
 from campaign.physics.vector import LANES
 from campaign.trial import Task
-
-__all__ = ["FrictionAlong", "make_grid", "simulate", "simulate_together"]
 
 STRETCH_STEPS = 20_000
 """Steps of a trial between two checks of limits and stops."""

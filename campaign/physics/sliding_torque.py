@@ -21,14 +21,12 @@ from typing import Any
 import numpy as np
 from numba import carray
 from numba.extending import overload
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.physics.compilation import compiled_callback
 from campaign.physics.rows import ASKED_DIRECTION, ASKED_SPEED, HAS, HAS_RATE, HAS_TORQUE
 from campaign.physics.step_function import SIGNATURE, own_name
 from campaign.physics.vector import MOST_ROWS
-
-Array = NDArray[np.float64]
 
 
 def address_of_sliding(sliding: Callable[..., Any], lanes: int, parameters: int) -> int:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.physics.bench import Bench
-
-Array = NDArray[np.float64]
+from campaign.physics.friction import model_of
+from campaign.physics.variation import of_its_day
 
 
 def steady_friction(bench: Bench, rate: Array) -> tuple[Array, Array]:
@@ -16,12 +16,9 @@ def steady_friction(bench: Bench, rate: Array) -> tuple[Array, Array]:
     The dry part has the sign of the rate: s(v) sgn(v) of Equation 4.6. Friction is that of the
     bench's day and preload, at the mean of the ripple over position.
     """
-    from campaign.physics.friction import friction_models
-    from campaign.physics.variation import of_its_day
-
     dry, viscous = np.zeros_like(rate), np.zeros_like(rate)
     for friction in of_its_day(bench).friction.values():
-        model = friction_models()[friction.model]
+        model = model_of(friction)
         torque, rate_ratio = bench.at_load(friction)
         speed = rate * rate_ratio
         linear = model.viscous(friction) * speed

@@ -60,19 +60,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import ComplexArray
 from campaign.physics.base_motion import base_rate
 from campaign.physics.compensation.interface import Compensator
 from campaign.physics.complete import CompleteBench
-from campaign.physics.friction import friction_models, is_dry, jumps
+from campaign.physics.friction import is_dry, jumps, model_of, small_signal_of
 from campaign.physics.friction.interface import FrictionOptions, Presliding
-from campaign.physics.loop import at_load, make_compensator, make_loop
+from campaign.physics.loop import make_compensator, make_loop
 from campaign.physics.rows import COMPENSATION, FRICTION, RATE, RELATIVE_ANGLE
 from campaign.signals import MultiSine, Polyline, Signal, Sine
 from campaign.trial import Task
-
-Poles = NDArray[np.complex128]
 
 LONGEST = 1e-3
 """s."""
@@ -209,7 +207,7 @@ def _limits(bench: CompleteBench, task: Task) -> Iterator[_Limit]:
 
 def _own_times(friction: list[tuple[str, FrictionOptions]]) -> Iterator[_Limit]:
     for place, options in friction:
-        model = friction_models()[options.model]  # type: ignore[attr-defined]
+        model = model_of(options)
         if model.fastest is not None and (fastest := model.fastest(options)) > 0.0:
             yield _Limit(OWN * fastest, f"the fastest time of {place}")
 
@@ -219,9 +217,8 @@ def _contacts(friction: list[tuple[str, FrictionOptions]], bench: CompleteBench)
     for place, options in friction:
         bristles = _bristles(options)
         if bristles is not None:
-            model = friction_models()[options.model]  # type: ignore[attr-defined]
-            torque, rate = at_load(options, bench)
-            sliding = model.steady_state(options, SPEEDS)
+            torque, rate = bench.at_load(options)
+            sliding = model_of(options).steady_state(options, SPEEDS)
             contacts.append(
                 _Contact(
                     place,
@@ -235,36 +232,30 @@ def _contacts(friction: list[tuple[str, FrictionOptions]], bench: CompleteBench)
 
 def _bristles(options: FrictionOptions) -> Presliding | None:
     """Spring and damper of an interface at rest; None without bristles."""
-    model = friction_models()[options.model]  # type: ignore[attr-defined]
-    if model.small_signal is None:
-        return None
-    stuck = model.small_signal(options).stuck
+    stuck = small_signal_of(options).stuck
     return stuck if stuck is not None and stuck.stiffness > 0.0 else None
 
 
-def stuck_poles(bench: CompleteBench, task: Task, compensator: Compensator) -> Poles:
+def stuck_poles(bench: CompleteBench, task: Task, compensator: Compensator) -> ComplexArray:
     """Poles (1/s) of the loop at rest, plant and compensation stuck on their bristles."""
     loop = make_loop(bench, "rate" if task.mode == "rate" else "torque", compensator)
     a, low_pass = loop.a.copy(), bench.controller.relative_rate_filter
     for options in bench.friction.values():
         if (bristles := _bristles(options)) is not None:
-            at = math.prod(at_load(options, bench))
+            at = math.prod(bench.at_load(options))
             a[:, RELATIVE_ANGLE] += loop.b[:, FRICTION] * at * bristles.stiffness
             a[:, RATE] += loop.b[:, FRICTION] * at * bristles.damping
     for options, gain in compensator.friction:
-        model = friction_models()[options.model]  # type: ignore[attr-defined]
-        stuck = None
-        if model.small_signal is not None:
-            stuck = model.small_signal(options).stuck_compensation
+        stuck = small_signal_of(options).stuck_compensation
         if stuck is not None:
-            added = loop.b[:, COMPENSATION] * gain * math.prod(at_load(options, bench))
+            added = loop.b[:, COMPENSATION] * gain * math.prod(bench.at_load(options))
             # Behind the low-pass, the bristles move by the angle minus the lag of the filter.
             a[:, RELATIVE_ANGLE] += added * stuck.stiffness
             a[:, loop.seen] += added * (stuck.damping - low_pass * stuck.stiffness)
     return np.linalg.eigvals(a).astype(complex)
 
 
-def _load_poles(inertia: float, damping: float, stiffness: float) -> Poles:
+def _load_poles(inertia: float, damping: float, stiffness: float) -> ComplexArray:
     """Poles (1/s) of the load on its bristles and on the spring of mode `spring`."""
     # As in `np.roots`, without its search for zero coefficients.
     return np.linalg.eigvals([[-damping / inertia, -stiffness / inertia], [1.0, 0.0]]).astype(
@@ -272,12 +263,12 @@ def _load_poles(inertia: float, damping: float, stiffness: float) -> Poles:
     )
 
 
-def _fastest(poles: Poles) -> float:
+def _fastest(poles: ComplexArray) -> float:
     """Largest magnitude of a pole (1/s)."""
     return float(np.max(np.abs(poles)))
 
 
-def _ringing(poles: Poles, duration: float) -> float:
+def _ringing(poles: ComplexArray, duration: float) -> float:
     """tau_o (s): 1 / tau_o^2 is the largest |p|^3 t sqrt(t / T) of an oscillating pole p.
 
     In a step h the phase of a mode has a relative error of (h |p|)^2. It accumulates over the

@@ -31,8 +31,8 @@ import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 from numba.extending import intrinsic, overload
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.physics.compilation import compiled_callback, pasted
 from campaign.physics.elementary import where
 from campaign.physics.rows import (
@@ -60,8 +60,6 @@ from campaign.physics.rows import (
     MEETS_STEP,
 )
 from campaign.physics.vector import add_up, rows_at
-
-Array = NDArray[np.float64]
 
 ROOM_TEMPERATURE = 293.15
 """K; no bench states another temperature yet."""

@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from campaign.physics.bench import Bench
-from campaign.physics.friction import friction_models
+from campaign.physics.friction import small_signal_of
 from campaign.physics.friction.stribeck import in_direction
-from campaign.physics.loop import at_load, viscous_at_load
+from campaign.physics.loop import viscous_at_load
 
 DIRECTIONS = {"positive": +1.0, "negative": -1.0}
 COULOMB = ("viscous_friction", "negative")
@@ -82,7 +82,7 @@ def stribeck_parameters(bench: Bench, sign: float) -> dict[str, float]:
     for options in bench.friction.values():
         if not all(hasattr(options, name) for name in ("coulomb_torque", *COULOMB)):
             return {}
-        torque, rate = at_load(options, bench)
+        torque, rate = bench.at_load(options)
         known = [name for name in _SLIDING if hasattr(options, name)]
         own = {name: in_direction(options, name, sign) for name in known}
         own.setdefault("static_torque", own["coulomb_torque"])
@@ -111,12 +111,11 @@ def _bristles(bench: Bench) -> list[tuple[float, float]]:
     """
     bristles = []
     for options in bench.friction.values():
-        small_signal = friction_models()[options.model].small_signal
-        stuck = None if small_signal is None else small_signal(options).stuck
+        stuck = small_signal_of(options).stuck
         static = getattr(options, "static_torque", None)
         if stuck is None or static is None:
             return []
-        torque, rate = at_load(options, bench)
+        torque, rate = bench.at_load(options)
         bristles.append((torque * static, torque * rate * stuck.stiffness))
     return bristles
 
@@ -143,7 +142,7 @@ def _damping_at_rest(bench: Bench) -> float | None:
         own = getattr(options, "bristle_damping", None)
         if own is None:
             return None
-        torque, rate = at_load(options, bench)
+        torque, rate = bench.at_load(options)
         dampings.append(torque * rate * own + viscous_at_load(options, bench))
     return math.fsum(dampings) if dampings else None
 

@@ -13,9 +13,8 @@ from typing import Any
 
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete
+from campaign.physics.friction_paths import Keys
 from campaign.trial import Tree, canonical_json
-
-Keys = tuple[str | int, ...]
 
 SOFTWARE = ("controller", "compensation", "limits")
 """Tables that always come from the stated bench; those of the truth are not used."""

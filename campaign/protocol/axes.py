@@ -21,7 +21,7 @@ from campaign.protocol.matrix import (
 )
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, find_faults, shown, validate
-from campaign.protocol.schema import Test, TestEntry, replaced
+from campaign.protocol.schema import Test, TestEntry, replaced, with_values
 from campaign.protocol.shapes import Shape
 from campaign.text import nearest
 
@@ -50,12 +50,13 @@ def value_problems(test: Test) -> Iterator[Problem]:
     bench is also due to the value, because the bench is valid without it. A fault elsewhere in the
     options may depend on the whole point, which the plan validates.
     """
-    options, bench = first_point(test)
+    options = with_values(test.options, ((axis, 0) for axis in test.axes if not axis.of_bench))
+    bench = with_values(test.bench, ((axis, 0) for axis in test.axes if axis.of_bench))
     for axis in test.axes:
         yield from _repeated(axis)
         tree = bench if axis.of_bench else options
         model: type[BaseModel] = Bench if axis.of_bench else test.experiment.options
-        for index in _to_check(axis):
+        for index in range(len(axis)) if axis.listed else sorted({0, len(axis) - 1}):
             origin = axis.value_origin(index)
             valid = find_faults(model, replaced(tree, axis.keys, axis.value(index)))
             for keys, aim, message in valid if isinstance(valid, list) else ():
@@ -76,17 +77,6 @@ def _repeated(axis: Axis) -> Iterator[Problem]:
             message = f"{shown(axis.value(index))} stands there twice; to repeat, use 'repeat'"
             yield axis.value_origin(index).problem((), "value", message)
         seen.add(value)
-
-
-def first_point(test: Test) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Options and bench as written, with the first value of every axis."""
-    options, bench = dict(test.options), dict(test.bench)
-    for axis in test.axes:
-        if axis.of_bench:
-            bench = replaced(bench, axis.keys, axis.value(0))
-        else:
-            options = replaced(options, axis.keys, axis.value(0))
-    return options, bench
 
 
 def is_large(axes: Sequence[Axis], repeat: int) -> bool:
@@ -137,10 +127,3 @@ def _values(written: Any, origin: Origin) -> Sequence[Any] | Range:
         return make_range(entry)
     except ValueError as error:
         return [origin.problem((), "value", str(error))]
-
-
-def _to_check(axis: Axis) -> Iterator[int]:
-    if axis.listed:
-        yield from range(len(axis))
-    else:
-        yield from sorted({0, len(axis) - 1})

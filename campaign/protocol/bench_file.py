@@ -44,11 +44,11 @@ def bench_source(written: str) -> Source:
 
 def checked(source: Source) -> Bench:
     """The bench in a file. Raises ProtocolError with all its problems."""
-    bench = validate(Bench, source.tree, Within(source))
+    origin = Within(source)
+    bench = validate(Bench, source.tree, origin)
     if not isinstance(bench, Bench):
         raise ProtocolError(bench)
-    origin, folder = Within(source), source.file.parent
-    problems = list(cell_problems(bench.known, origin, folder, must_be_there=True))
+    problems = list(cell_problems(bench.known, origin, source.file.parent, must_be_there=True))
     if problems:
         raise ProtocolError(problems)
     return bench

@@ -9,12 +9,12 @@ from typing import Any
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
 from campaign.protocol.expand import ExpandedTest, place_hash
-from campaign.protocol.schema import Check
+from campaign.protocol.schema import CheckEntry, Protocol
 from campaign.trial import Role, Trial
 
 
 def with_checks(
-    tests: Sequence[ExpandedTest], named: int, check: Check, seed: int
+    tests: Sequence[ExpandedTest], named: int, check: CheckEntry, seed: int
 ) -> list[ExpandedTest]:
     """The tests with the checks inserted, all numbered in the order of execution.
 
@@ -49,10 +49,10 @@ def with_checks(
     ]
 
 
-def nothing_to_check(check: Check) -> Problem:
+def nothing_to_check(protocol: Protocol, test: str) -> Problem:
     """The problem of a `[check]` whose test has no measurement."""
-    message = f"the test '{check.test}' has no measurement that could be repeated"
-    return check.origin.problem(("check", "test"), "value", message)
+    message = f"the test '{test}' has no measurement that could be repeated"
+    return protocol.origin.problem(("check", "test"), "value", message)
 
 
 def _first(test: ExpandedTest) -> tuple[Trial, Bench]:

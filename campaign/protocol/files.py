@@ -85,18 +85,6 @@ class Within:
 
 
 @dataclass(frozen=True)
-class At:
-    """One place for all problems of a value that is inserted there, e.g. a swept one."""
-
-    source: Source
-    keys: Keys
-    aim: Aim = "value"
-
-    def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
-        return self.source.problem((*self.keys, *keys), aim if keys else self.aim, message)
-
-
-@dataclass(frozen=True)
 class Typed:
     """A value given on the command line, with the option's name."""
 

@@ -32,12 +32,10 @@ class _Generator(GenerateJsonSchema):
     """Generator with quantities, choices between tables, and docstrings of fields."""
 
     def function_before_schema(self, schema: Any) -> Tree:
-        """See `GenerateJsonSchema`."""
         owner = getattr(schema["function"]["function"], "__self__", None)
         return _quantity(owner) if isinstance(owner, Quantity) else self._inner(schema["schema"])
 
     def function_plain_schema(self, schema: Any) -> Tree:
-        """See `GenerateJsonSchema`."""
         owner = getattr(schema["function"]["function"], "__self__", None)
         if isinstance(owner, Choice):
             return self._choice(owner)
@@ -54,7 +52,6 @@ class _Generator(GenerateJsonSchema):
         return self._inner(schema["schema"])
 
     def model_schema(self, schema: Any) -> Tree:
-        """See `GenerateJsonSchema`."""
         tree: Tree = super().model_schema(schema)
         model = schema["cls"]
         for name, each in tree.get("properties", {}).items():
@@ -64,28 +61,22 @@ class _Generator(GenerateJsonSchema):
         return tree
 
     def _choice(self, choice: Choice) -> Tree:
-        words = [word for word in choice.words() if choice.options(word) is not None]
+        tables = choice.tables()
         return {
             "type": "object",
             "required": [choice.tag],
-            "properties": {choice.tag: {"enum": words}},
+            "properties": {choice.tag: {"enum": list(tables)}},
             "allOf": [
                 {
                     "if": {"properties": {choice.tag: {"const": word}}, "required": [choice.tag]},
-                    "then": self._inner(_core(choice.options(word))),
+                    "then": self._inner(table.__pydantic_core_schema__),
                 }
-                for word in words
+                for word, table in tables.items()
             ],
         }
 
     def _inner(self, schema: Any) -> Tree:
         return dict(self.generate_inner(schema))
-
-
-def _core(model: type[BaseModel] | None) -> Any:
-    if model is None:
-        raise TypeError("no options")
-    return model.__pydantic_core_schema__
 
 
 def _quantity(quantity: Quantity) -> Tree:

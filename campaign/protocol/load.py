@@ -38,15 +38,16 @@ from campaign.protocol.points import PointError, first_point
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, shown, validate
 from campaign.protocol.schema import (
-    Check,
     CheckEntry,
     ExperimentKind,
     Protocol,
     ProtocolFile,
     Test,
     TestEntry,
+    origin_with_values,
     replaced,
     split_entry,
+    with_values,
 )
 from campaign.protocol.shapes import Read, attach, attach_values
 from campaign.protocol.truth_file import Truths
@@ -89,7 +90,7 @@ def load_protocol(
         raise _failed(collected)
     published = loader.published(source, top.published, origin)
     calibration = loader.calibration(source, top.calibration, origin)
-    check = loader.check(top.check, origin)
+    loader.check(top.check, origin)
     if not collected.drafts and not collected.problems:
         message = "no tests; add a [[test]], or include a protocol that has some"
         collected.problems.append(Problem(path, 1, 1, message))
@@ -108,7 +109,7 @@ def load_protocol(
         overrides=tuple(overrides),
         calibration=calibration,
         policy=Policy(faults=top.faults, rest=top.rest, keep=top.keep),
-        check=check,
+        check=top.check,
         truth_sources=loader.truths.texts,
         columns=top.columns,
         origin=origin,
@@ -167,16 +168,13 @@ class _Loader:
                 self._report(draft.origin.problem(("bench",), "value", message))
         return Calibration(options, bench, origin)
 
-    def check(self, entry: CheckEntry | None, origin: Origin) -> Check | None:
-        """The repeated trial; its test may be in an included protocol."""
-        if entry is None:
-            return None
+    def check(self, entry: CheckEntry | None, origin: Origin) -> None:
+        """Check the repeated trial; its test may be in an included protocol."""
         names = [draft.name for draft in self.collected.drafts]
-        if entry.test not in names:
+        if entry is not None and entry.test not in names:
             message = f"no test is called {shown(entry.test)}; {allowed(names)}"
             message += nearest(entry.test, names)
             self._report(origin.problem(("check", "test"), "value", message))
-        return Check(entry.test, entry.every, origin)
 
     def _report(self, *problems: Problem) -> None:
         self.collected.problems += problems
@@ -200,7 +198,7 @@ class _Loader:
         if isinstance(valid, Bench) and bench is not None:
             folder = bench.file.parent
             self._report(*cell_problems(valid.known, bench_origin, folder))
-        options = self._attached(draft, experiment, options)
+        options = attach(experiment.options, options, self._reader(draft, draft.origin))
         with axis_terms(sides_in(tree)):
             axes = self._axes(draft, experiment, options, known)
             self._options(draft, experiment, options, axes)
@@ -243,12 +241,6 @@ class _Loader:
             self.files.read(read_any_text, file, name, draft.origin, ("bench",), str(file))
         return bench
 
-    def _attached(
-        self, draft: Draft, experiment: ExperimentKind, options: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """The options with the content of the files that they name."""
-        return attach(experiment.options, options, self._reader(draft, draft.origin))
-
     def _reader(self, draft: Draft, origin: Origin) -> Read:
         """A function that reads a file beside the draft's protocol and adds it to the sources."""
 
@@ -285,12 +277,8 @@ class _Loader:
         self, draft: Draft, experiment: ExperimentKind, options: Any, axes: tuple[Axis, ...]
     ) -> None:
         """Validate the options with the first value of every axis."""
-        tree, patches = dict(options), []
-        for axis in axes:
-            if not axis.of_bench:
-                tree = replaced(tree, axis.keys, axis.value(0))
-                patches.append((axis.keys, axis.value_origin(0)))
-        origin = PatchedTree(draft.origin, patches)
+        swept = [(axis, 0) for axis in axes if not axis.of_bench]
+        tree, origin = with_values(options, swept), origin_with_values(draft.origin, swept)
         valid = validate(experiment.options, tree, origin, also=TestEntry.model_fields)
         if isinstance(valid, list):
             self._report(*valid)

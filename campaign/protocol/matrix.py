@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from campaign.options import Options, TextFile
-from campaign.protocol.files import Origin
+from campaign.protocol.files import Origin, Within
 from campaign.protocol.positions import Keys
 from campaign.units import split_quantity
 
@@ -113,18 +113,7 @@ class Axis:
 
     def value_origin(self, index: int) -> Origin:
         """The place of a value in the file; for a range, the place of the range."""
-        return _Element(self.origin, index) if self.listed else self.origin
-
-
-@dataclass(frozen=True)
-class _Element:
-    """One element of a list."""
-
-    origin: Origin
-    index: int
-
-    def problem(self, keys: Keys, aim: Any, message: str) -> Any:
-        return self.origin.problem((self.index, *keys), aim, message)
+        return Within(self.origin, (index,)) if self.listed else self.origin
 
 
 def points(axes: Sequence[Axis]) -> Iterator[tuple[int, ...]]:

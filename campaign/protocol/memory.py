@@ -7,8 +7,7 @@ exhaust the memory of the machine that moves a bench.
 
 from __future__ import annotations
 
-import math
-
+from campaign.protocol.matrix import count_points
 from campaign.protocol.schema import Test
 from campaign.signals import MultiSine, Polyline, Signal
 from campaign.trial import Task
@@ -27,9 +26,8 @@ KNOT = 64
 
 def least(test: Test) -> int:
     """Minimum bytes of the plan of `test`; an experiment may request more trials."""
-    benches = math.prod(len(axis) for axis in test.axes if axis.of_bench)
-    points = math.prod(len(axis) for axis in test.axes)
-    return points * test.entry.repeat * TRIAL + benches * BENCH
+    benches = count_points([axis for axis in test.axes if axis.of_bench])
+    return count_points(test.axes) * test.entry.repeat * TRIAL + benches * BENCH
 
 
 def of_task(task: Task) -> int:
@@ -49,7 +47,7 @@ def _knots(signal: Signal) -> int:
 
 def refusal(test: Test, bytes_needed: int) -> str:
     """Message for a test whose plan would need too much memory."""
-    points = math.prod(len(axis) for axis in test.axes)
+    points = count_points(test.axes)
     repeated = f", {test.entry.repeat} times" if test.entry.repeat > 1 else ""
     whole = f"{points} point{'s' if points != 1 else ''} of its matrix{repeated}"
     return (

@@ -235,7 +235,7 @@ def _expanded(
         return expansions  # --only excludes the test to repeat
     named = names.index(check.test)
     if expansions[named].first_measurement is None:
-        raise ProtocolError([nothing_to_check(check)])
+        raise ProtocolError([nothing_to_check(protocol, check.test)])
     return with_checks(expansions, named, check, seed_of(chosen[named], master))
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import JsonValue
 
-from campaign.physics.limits import Margin
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.plan_loops import LoopUse
 from campaign.protocol.plan import LimitUse, Plan, PlannedTest
@@ -125,7 +124,7 @@ def _trial(trial: Trial) -> dict[str, Any]:
 
 
 def _use(use: LimitUse) -> dict[str, JsonValue]:
-    margin: Margin = use.margin
+    margin = use.margin
     return {
         "limit": margin.limit,
         "sensor": margin.sensor,

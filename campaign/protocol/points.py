@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from pydantic import JsonValue, ValidationError
 
@@ -13,11 +12,10 @@ from campaign.errors import Problem
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError
-from campaign.protocol.files import PatchedTree
+from campaign.physics.truth import value_at
 from campaign.protocol.matrix import Axis, points
-from campaign.protocol.positions import Keys
 from campaign.protocol.problems import validate
-from campaign.protocol.schema import Test, replaced
+from campaign.protocol.schema import Test, origin_with_values, with_values
 from campaign.protocol.swept_value_text import as_written
 from campaign.trial import Tree, canonical_json
 
@@ -87,7 +85,7 @@ def points_of(test: Test) -> Iterator[Point]:
         bench, bench_tree = cache.bench(indices)
         options, options_tree, chosen = cache.fitted(indices)
         values = {
-            axis.path: _at(bench_tree if axis.of_bench else options_tree, axis.keys)
+            axis.path: value_at(bench_tree if axis.of_bench else options_tree, axis.keys)
             for axis in test.axes
         }
         pairs = zip(test.axes, indices, strict=True)
@@ -120,11 +118,8 @@ class _Cache:
         swept = self._swept(indices, of_bench=False)
         key = tuple(index for _, index in swept)
         if key not in self.known_options:
-            tree = dict(self.test.options)
-            for axis, index in swept:
-                tree = replaced(tree, axis.keys, axis.value(index))
-            patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
-            origin = PatchedTree(self.test.origin, patches)
+            tree = with_values(self.test.options, swept)
+            origin = origin_with_values(self.test.origin, swept)
             with axis_terms(sides_in(self.test.bench)):
                 valid = validate(self.test.experiment.options, tree, origin)
             if isinstance(valid, list):
@@ -170,18 +165,13 @@ class _Cache:
         if not self.plain_bench:
             valid = Bench.model_validate(self.test.bench)
             self.plain_bench = valid.model_dump(mode="json")
-        tree: dict[str, Any] = self.plain_bench
-        for axis, index in swept:
-            tree = replaced(tree, axis.keys, axis.value(index))
         try:
             # Validation of the normalized bench is 20 times faster than of its text.
+            tree = with_values(self.plain_bench, swept)
             return Bench.model_validate(tree, context={"si": True})
         except ValidationError:
-            patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
-            raw = dict(self.test.bench)
-            for axis, index in swept:
-                raw = replaced(raw, axis.keys, axis.value(index))
-            again = validate(Bench, raw, PatchedTree(self.test.bench_origin, patches))
+            raw = with_values(self.test.bench, swept)
+            again = validate(Bench, raw, origin_with_values(self.test.bench_origin, swept))
             if isinstance(again, Bench):
                 return again
             raise PointError(again) from None
@@ -189,10 +179,3 @@ class _Cache:
     def _swept(self, indices: tuple[int, ...], *, of_bench: bool) -> list[tuple[Axis, int]]:
         pairs = zip(self.test.axes, indices, strict=True)
         return [(axis, index) for axis, index in pairs if axis.of_bench is of_bench]
-
-
-def _at(tree: Any, keys: Keys) -> JsonValue:
-    for key in keys:
-        tree = tree[key]
-    value: JsonValue = tree
-    return value

@@ -17,7 +17,7 @@ from campaign.options import Options, spelled
 from campaign.physics.bench import Bench
 from campaign.policy import Keep, Occasion, Policy, Response, Rest
 from campaign.protocol.calibration import Calibration, CalibrationOptions
-from campaign.protocol.files import Origin
+from campaign.protocol.files import Origin, PatchedTree
 from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Keys
 from campaign.trial import Most, OfferedRecording, Tree, TrialRequest
@@ -186,21 +186,6 @@ class Test:
 
 
 @dataclass(frozen=True)
-class Check:
-    """The `[check]` of a loaded protocol.
-
-    Attributes:
-        test: name of the test whose first measurement is repeated.
-        every: number of measurements between checks.
-        origin: of the protocol's top level, for later problems.
-    """
-
-    test: str
-    every: int
-    origin: Origin
-
-
-@dataclass(frozen=True)
 class Protocol:
     """A validated protocol with its includes.
 
@@ -208,11 +193,12 @@ class Protocol:
         path: of the file, as the user named it.
         published: "thesis", "none", or the name of a source.
         sources: verbatim text of every protocol, bench and published file, by its name as written.
+        origin: of the file's top level, for later problems.
         overrides: texts of `--set`.
         calibration: None if the protocol has none.
         policy, check: of this file; those of included protocols do not apply.
         truth_sources: verbatim text of every truth, by its name as written; not among `sources`.
-        columns: columns of imported files, as written in this file; `origin` is their place.
+        columns: columns of imported files, as written in this file.
     """
 
     path: Path
@@ -224,13 +210,26 @@ class Protocol:
     published: str
     tests: tuple[Test, ...]
     sources: Mapping[str, str]
+    origin: Origin
     overrides: tuple[str, ...] = ()
     calibration: Calibration | None = None
     policy: Policy = field(default_factory=Policy)
-    check: Check | None = None
+    check: CheckEntry | None = None
     truth_sources: Mapping[str, str] = field(default_factory=dict)
     columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    origin: Origin | None = None
+
+
+def with_values(tree: Mapping[str, Any], swept: Iterable[tuple[Axis, int]]) -> dict[str, Any]:
+    """A copy of options or bench with values of its swept paths, each by its index in the axis."""
+    copy = dict(tree)
+    for axis, index in swept:
+        copy = replaced(copy, axis.keys, axis.value(index))
+    return copy
+
+
+def origin_with_values(origin: Origin, swept: Iterable[tuple[Axis, int]]) -> PatchedTree:
+    """The origin of that copy."""
+    return PatchedTree(origin, [(axis.keys, axis.value_origin(index)) for axis, index in swept])
 
 
 def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

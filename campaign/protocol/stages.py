@@ -15,7 +15,7 @@ from pydantic import JsonValue
 
 from campaign.protocol.points import Point
 from campaign.protocol.schema import Test
-from campaign.trial import NONE_MORE, Most, Role, Trial, canonical_json
+from campaign.trial import NONE_MORE, Most, canonical_json
 
 FIRST = 2
 """Number of the stage that follows first; the planned trials are stage 1."""
@@ -40,14 +40,6 @@ class PlannedStage:
     point: Mapping[str, JsonValue]
     seed: int
     most: Most
-
-    def is_of(self, trial: Trial) -> bool:
-        """Whether the stage depends on `trial`: same test and point, and no check."""
-        return (
-            trial.test == self.test
-            and trial.role is not Role.CHECK
-            and all(trial.point.get(path) == value for path, value in self.point.items())
-        )
 
     @property
     def place(self) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pydantic import ValidationError
+
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
 from campaign.physics.complete import lacking
@@ -70,6 +72,7 @@ def _not_there(draft: Draft, plant: Tree, axes: Sequence[Axis], name: str) -> li
 
 def _reason(error: ValueError) -> str:
     """The first error of a refused bench or truth."""
-    errors = getattr(error, "errors", None)
-    text = errors()[0]["msg"].removeprefix("Value error, ") if callable(errors) else str(error)
-    return f"under the stated controller: {text}" if callable(errors) else text
+    if isinstance(error, ValidationError):
+        text = error.errors()[0]["msg"].removeprefix("Value error, ")
+        return f"under the stated controller: {text}"
+    return str(error)

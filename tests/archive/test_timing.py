@@ -8,13 +8,13 @@ from pathlib import Path
 
 from campaign.archive import RunHeader, RunStatus, RunWriter
 from campaign.backends.sim import SimBackend, SimOptions
-from campaign.stopwatch import NullStopwatch, Work
+from campaign.stopwatch import Timing, Work
 from tests.archives import plan_of
 
 NOW = "2026-01-01T00:00:00Z"
 
 
-class Heard(NullStopwatch):
+class Heard(Timing):
     """Remembers which spans began; each block of the engine is one."""
 
     def __init__(self) -> None:

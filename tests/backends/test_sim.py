@@ -11,6 +11,7 @@ from campaign.backends.sim import BACKEND, CHANNELS, SimBackend, SimOptions
 from campaign.physics import lanes as lanes_module
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
+from campaign.physics.grid import make_grid
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording, SafeState
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task, Trial
@@ -193,7 +194,7 @@ def test_a_limit_after_the_stop_rate_does_not_count() -> None:
 
 def test_somebody_can_stop_it_between_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     swinging = task(base_acceleration=SWING)
-    per_sample = simulate_module.make_grid(bench(), swinging).every
+    per_sample = make_grid(bench(), swinging).every
     monkeypatch.setattr(simulate_module, "STRETCH_STEPS", 100 * per_sample)
     asked = iter([False, False, True])
     ending, recording = execute(bench(), swinging, lambda: next(asked))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from campaign.physics.base_motion import base_rate
-from campaign.physics.simulate import make_grid
+from campaign.physics.grid import make_grid
 from campaign.signals import MultiSine, Polyline, Sine, Zero
 from tests.physics.benches import bench, run, stribeck, task
 

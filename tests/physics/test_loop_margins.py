@@ -242,7 +242,7 @@ def test_a_friction_model_that_declares_nothing_is_known_only_while_it_slides(
     models = friction_models()
     silent = replace(models["lugre"], small_signal=None)
     monkeypatch.setattr(
-        "campaign.physics.linear_friction.friction_models", lambda: {**models, "lugre": silent}
+        "campaign.physics.friction.friction_models", lambda: {**models, "lugre": silent}
     )
     with pytest.raises(NoLoopError, match="'lugre' does not declare"):
         open_loop(bench(), "none", "rate", "stuck")

@@ -9,7 +9,7 @@ import pytest
 
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
-from campaign.physics.simulate import make_grid
+from campaign.physics.grid import make_grid
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task
 from tests.physics.benches import KT, RATIO, bench, run, task

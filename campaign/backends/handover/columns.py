@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from campaign.backends.handover.excitation import axis_of
-from campaign.channels import COMMAND, VOCABULARY, AxisKind, KnownBy, info
+from campaign.axis_kind import AxisKind, sides_in
+from campaign.channels import COMMAND, VOCABULARY, KnownBy, info
 from campaign.errors import Problem, ProtocolError
 from campaign.importing.mapping import Layout, layouts
 from campaign.protocol.files import Source, UnreadableError, read_source
@@ -72,7 +72,7 @@ def requested_channels(trials: Sequence[Trial]) -> tuple[tuple[str, ...], tuple[
     required = dict.fromkeys((COMMAND, *(name for trial in trials for name in trial.requires)))
     useful = dict.fromkeys(name for trial in trials for name in trial.can_use)
     return tuple(required), tuple(
-        name for name in useful if name not in required and _can_be_recorded(name)
+        name for name in useful if name not in required and can_be_recorded(name)
     )
 
 
@@ -88,7 +88,7 @@ def first_mapping(trials: Sequence[Trial]) -> str:
 
 def _layout(name: str, mode: str, trials: Sequence[Trial]) -> str:
     required, useful = requested_channels(trials)
-    axis = axis_of(trials[0])
+    axis = sides_in(trials[0].bench).load
     text = f'\n[columns.{name}.time]\ncolumn = "time"\nunit = "s"\n'
     for channel in required:
         text += "\n" + "\n".join(_entry(name, channel, mode, axis)) + "\n"
@@ -104,5 +104,6 @@ def _entry(layout: str, name: str, mode: str, axis: AxisKind) -> list[str]:
     return [f"[columns.{layout}.{name}]", f'column = "{name}"', f'unit = "{unit or 1}"']
 
 
-def _can_be_recorded(name: str) -> bool:
+def can_be_recorded(name: str) -> bool:
+    """Whether a rig can have a sensor for this channel."""
     return name not in VOCABULARY or VOCABULARY[name].known_by is not KnownBy.SIMULATOR

@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from campaign.axis_kind import sides_in
-from campaign.channels import COMMAND, VOCABULARY, AxisKind, info
-from campaign.channels import axis_of as axis_of_channel
+from campaign.channels import COMMAND, VOCABULARY, axis_of, info
 from campaign.importing.derived_channels import RigFacts
 from campaign.physics.base_motion import base_rate
 from campaign.physics.bench import Bench
@@ -39,18 +38,11 @@ def samples_of(task: Task) -> int:
     return max(2, round(task.duration * task.sample_rate))
 
 
-def axis_of(trial: Trial) -> AxisKind:
-    """Kind of axis of the trial's bench."""
-    axis = trial.bench.get("axis")
-    kind = axis.get("kind", AxisKind.ROTARY) if isinstance(axis, dict) else AxisKind.ROTARY
-    return AxisKind(str(kind))
-
-
 def shown(trial: Trial, channel: str, value: float) -> str:
     """Text of a channel's value (SI) in its display unit."""
     if channel not in VOCABULARY:
         return f"{value:.6g}"
-    axis = axis_of_channel(channel, sides_in(trial.bench))
+    axis = axis_of(channel, sides_in(trial.bench))
     what = info(channel, trial.task.mode, axis=axis)
     number = f"{convert(value, what.unit, what.display_unit) if what.unit else value:.6g}"
     return f"{number} {what.display_unit}".rstrip()
@@ -66,7 +58,7 @@ def facts_of(trial: Trial) -> RigFacts:
 
 def excitation(trial: Trial) -> Sequence[Series]:
     """Time, command and, for a moving hull, its acceleration and rate."""
-    task, axis = trial.task, axis_of(trial)
+    task, axis = trial.task, sides_in(trial.bench).load
     time = np.arange(samples_of(task)) / task.sample_rate
     unit = info(COMMAND, task.mode, axis=axis).unit
     series = [Series("time", "s", time), Series(COMMAND, unit, task.command.sample(time))]

@@ -12,7 +12,8 @@ import numpy as np
 
 from campaign.axis_kind import in_axis_terms, sides_in
 from campaign.backends.handover.acceptance import GO_ON
-from campaign.backends.handover.excitation import Series, axis_of, shown
+from campaign.backends.handover.columns import can_be_recorded, requested_channels
+from campaign.backends.handover.excitation import Series, shown
 from campaign.backends.handover.handover_folder import (
     COLUMNS,
     MANIFEST,
@@ -20,7 +21,7 @@ from campaign.backends.handover.handover_folder import (
     Verdict,
     read_json,
 )
-from campaign.channels import COMMAND, VOCABULARY, explained, info
+from campaign.channels import VOCABULARY, info, meaning_in_sentence
 from campaign.plain_text import on_a_page
 from campaign.trial import Role, Trial
 
@@ -231,7 +232,8 @@ def _channel(trial: Trial, name: str) -> dict[str, str]:
 
 
 def _unit(trial: Trial, name: str) -> str:
-    return info(name, trial.task.mode, axis=axis_of(trial)).unit if name in VOCABULARY else ""
+    axis = sides_in(trial.bench).load
+    return info(name, trial.task.mode, axis=axis).unit if name in VOCABULARY else ""
 
 
 def _row(row: Row, due: str) -> str:
@@ -301,15 +303,14 @@ def _settings(trial: Trial) -> list[str]:
 
 
 def _channels(trial: Trial) -> str:
-    needed = dict.fromkeys((COMMAND, *trial.requires))
-    useful = [name for name in trial.can_use if name not in needed]
+    needed, useful = requested_channels([trial])
     rows = [
         f"<tr><th scope='row'><code>{_text(name)}</code></th>"
         f"<td class='short'>{_text(_unit(trial, name))}</td>"
-        f"<td class='short'>{need}</td><td>{_text(_meaning(name))}</td></tr>"
+        f"<td class='short'>{need}</td><td>{_text(meaning_in_sentence(name))}</td></tr>"
         for names, need in ((needed, "needed"), (useful, "of use"))
         for name in names
-        if name not in VOCABULARY or info(name).measured
+        if can_be_recorded(name)
     ]
     head = "".join(f"<th scope='col'>{word}</th>" for word in ("channel", "SI unit", "", "what"))
     return (
@@ -317,11 +318,6 @@ def _channels(trial: Trial) -> str:
         "<p>A channel that follows from another need not be recorded: the drive torque from the "
         "motor current, the rate from the angle. Any unit will do that the layout names.</p>"
     )
-
-
-def _meaning(name: str) -> str:
-    text = explained(name)
-    return text.removeprefix(f"{name} (").removesuffix(")") if text != name else ""
 
 
 def _sketch(series: Series) -> str:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.backends.handover.excitation import axis_of, facts_of, samples_of
+from campaign.axis_kind import sides_in
+from campaign.backends.handover.excitation import facts_of, samples_of
 from campaign.channels import COMMAND, GYRO_RATE, RELATIVE_RATE, info, missing
 from campaign.importing.derived_channels import AT_REST
 from campaign.importing.description import RecordingDescription
@@ -150,7 +151,7 @@ def _announced(trial: Trial, channel: ChannelInfo) -> ChannelInfo:
     """Channel for announcement; the command gets the label of the mode. Raises ColumnsError."""
     if channel.name != COMMAND:
         return channel
-    due = info(COMMAND, trial.task.mode, axis=axis_of(trial))
+    due = info(COMMAND, trial.task.mode, axis=sides_in(trial.bench).load)
     if due.unit != channel.unit:
         raise ColumnsError(
             f"the command is read in {channel.unit}, and the trial commands {due.unit}"

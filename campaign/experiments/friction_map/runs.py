@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from campaign.axis_kind import is_linear
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
@@ -19,7 +19,7 @@ from campaign.estimate import Window
 from campaign.estimation.steady_stretches import steady_stretches
 from campaign.experiments.interface import bench_of, validated
 from campaign.experiments.shared.rig import Rig
-from campaign.options import Options
+from campaign.options import LaterOptions
 from campaign.physics.bench import Bench
 from campaign.signals import Polyline
 from campaign.trial import OfferedRecording, Role, Task, Trial, TrialRequest, canonical_json
@@ -47,8 +47,10 @@ ROUNDING = 1e-9
 """Relative rounding error of an angle from a difference of times."""
 
 
-class VelocityMapOptions(Options):
+class VelocityMapOptions(LaterOptions):
     """Options of a friction-velocity map."""
+
+    later = frozenset({"spread_starts"})
 
     slowest: AngularRate = Field(default=float(np.deg2rad(0.05)), gt=0)
     """Lowest speed of the map."""
@@ -90,14 +92,6 @@ class VelocityMapOptions(Options):
     spread_starts: bool = False
     """Whether each run starts at another angle, by the golden ratio. A ripple of friction over
     position then scatters the points, and does not bend the curve."""
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit `spread_starts` if it is off, as in archives from before it existed."""
-        tree: dict[str, Any] = dump(self)
-        if not self.spread_starts:
-            tree.pop("spread_starts", None)
-        return tree
 
     def without_effect(self) -> frozenset[str]:
         unused = {"slowest", "fastest", "points"} if self.speeds else set()

@@ -13,10 +13,9 @@ from functools import cached_property
 from campaign.physics.bench import Bench, LimitsOptions
 from campaign.physics.bench_facts import rate_steps
 from campaign.physics.complete import control_rate, lacking, limits_of
-from campaign.physics.friction import friction_models
+from campaign.physics.friction import small_signal_of
 from campaign.physics.limit_watch import judged_samples
 from campaign.physics.limits import worst_friction
-from campaign.physics.loop import at_load
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.plan_loops import loops_of
 from campaign.units import rate_text
@@ -32,13 +31,12 @@ MOST = 0.9
 def bristles(bench: Bench) -> Iterator[tuple[float, float] | None]:
     """Ts / sigma0 (rad) and sigma0 (N m/rad) of each interface, at the load; None if unknown."""
     for options in bench.friction.values():
-        declared = friction_models()[options.model].small_signal
-        stuck = None if declared is None else declared(options).stuck
+        stuck = small_signal_of(options).stuck
         static = getattr(options, "static_torque", None)
         if stuck is None or not stuck.stiffness > 0 or not static:
             yield None
             continue
-        torque, rate = at_load(options, bench)
+        torque, rate = bench.at_load(options)
         yield static / stuck.stiffness / rate, torque * rate * stuck.stiffness
 
 
@@ -63,7 +61,7 @@ class Rig:
     def stribeck_velocity(self) -> float | None:
         """Lowest Stribeck velocity of its interfaces, as the load's rate (rad/s)."""
         speeds = [
-            speed / at_load(options, self.bench)[1]
+            speed / self.bench.at_load(options)[1]
             for options in self.bench.friction.values()
             if (speed := getattr(options, "stribeck_velocity", None))
         ]

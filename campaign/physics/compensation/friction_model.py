@@ -12,7 +12,7 @@ from pydantic import Field, field_validator
 
 from campaign.options import Options
 from campaign.physics.compensation.interface import CompensationMethod, Compensator
-from campaign.physics.friction import FrictionField, friction_models
+from campaign.physics.friction import FrictionField, model_of
 
 
 class FrictionModelOptions(Options):
@@ -29,7 +29,7 @@ class FrictionModelOptions(Options):
     @classmethod
     def _can_compensate(cls, friction: dict[str, Any]) -> dict[str, Any]:
         for name, options in friction.items():
-            if why := friction_models()[options.model].no_compensation:
+            if why := model_of(options).no_compensation:
                 raise ValueError(f"{name}: '{options.model}' cannot compensate: {why}")
         return friction
 

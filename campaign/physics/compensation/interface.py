@@ -11,13 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from campaign.arrays import Array
 from campaign.options import Options
 from campaign.physics.friction.interface import FrictionOptions
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

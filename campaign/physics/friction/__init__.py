@@ -6,7 +6,7 @@ from functools import cache
 from typing import Annotated, Any
 
 from campaign.choice import Choice
-from campaign.physics.friction.interface import FrictionModel
+from campaign.physics.friction.interface import FrictionModel, SmallSignal
 from campaign.plugins import Kinds
 
 
@@ -20,12 +20,23 @@ FrictionField = Annotated[Any, Choice("model", friction_models)]
 """Options of one friction model, selected by `model`."""
 
 
+def model_of(options: Any) -> FrictionModel:
+    """The model of these options."""
+    return friction_models()[options.model]
+
+
+def small_signal_of(options: Any) -> SmallSignal:
+    """Response to small motions; without springs if the model does not declare it."""
+    declared = model_of(options).small_signal
+    return SmallSignal(None, None) if declared is None else declared(options)
+
+
 def is_dry(options: Any) -> bool:
     """Whether a model is set-valued at rest; the engine solves for it in the plant."""
-    return friction_models()[options.model].dry is not None
+    return model_of(options).dry is not None
 
 
 def jumps(options: Any) -> bool:
     """Whether its torque as a compensation jumps with the sign of the rate."""
-    dry = friction_models()[options.model].dry
+    dry = model_of(options).dry
     return dry is not None and dry.jumps(options)

@@ -35,11 +35,10 @@ from campaign.physics.friction.interface import (
     Array,
     FrictionModel,
     FrictionOptions,
-    Presliding,
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of, sign_of
-from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.stribeck import in_direction, mean_viscous, odd_viscous
 from campaign.physics.friction.unknowns import (
     BENDING,
     REVERSE,
@@ -102,9 +101,8 @@ def _parameters(options: ArmstrongOptions) -> Array:
     for sign in (1.0, -1.0):
         coulomb, static, velocity, _ = (in_direction(options, name, sign) for name in CURVE)
         values += [coulomb, static - coulomb, 1.0 / velocity]
-    viscous = [in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0)]
     own = [options.bristle_stiffness, options.memory_lag, options.dwell_time]
-    return np.array([*values, 0.5 * (viscous[0] - viscous[1]), *own])
+    return np.array([*values, odd_viscous(options), *own])
 
 
 def _state_size(options: ArmstrongOptions, step: float) -> int:
@@ -209,11 +207,6 @@ def steady_state(options: ArmstrongOptions, velocity: Array) -> Array:
     return torque
 
 
-def _small_signal(options: ArmstrongOptions) -> SmallSignal:
-    spring = Presliding(options.bristle_stiffness, 0.0)
-    return SmallSignal(stuck=spring, stuck_compensation=spring)
-
-
 def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
     late = ReversalTime("the memory lag", lambda options, turning: options["memory_lag"])
     lag = FrictionUnknown(
@@ -225,7 +218,7 @@ def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
         1e-3, 1e3, 0.1, "rest for different times before it breaks away", logarithmic=True,
         rests_on=(("bristle_stiffness",),), lasts=BENDING,
     )  # fmt: skip
-    return (*curve(sizes, by_direction=by_direction), stiffness(sizes), lag, dwell)
+    return (*curve(sizes, by_direction), stiffness(sizes), lag, dwell)
 
 
 FRICTION = FrictionModel(
@@ -239,7 +232,7 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     switches=lambda options: 2,
     changeable=(*CURVE, "bristle_stiffness", "memory_lag", "dwell_time"),
-    small_signal=_small_signal,
+    small_signal=lambda options: SmallSignal.of_bristles(options.bristle_stiffness),
     fastest=lambda options: options.memory_lag,
     unknowns=_unknowns,
 )

@@ -32,11 +32,10 @@ from campaign.physics.friction.interface import (
     Array,
     FrictionModel,
     FrictionOptions,
-    Presliding,
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of
-from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.stribeck import in_direction, mean_viscous, odd_viscous
 from campaign.physics.friction.unknowns import (
     BENDING,
     PRESLIDE,
@@ -123,8 +122,7 @@ def _settling(options: BlimanSorineOptions, way: float) -> tuple[float, float]:
 
 def _parameters(options: BlimanSorineOptions) -> Array:
     (fast, slow), (fast_back, slow_back) = (_settling(options, sign) for sign in (1.0, -1.0))
-    viscous = [in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0)]
-    half, stiffness = 0.5 * (viscous[0] - viscous[1]), options.bristle_stiffness
+    half, stiffness = odd_viscous(options), options.bristle_stiffness
     if options.order == 1:
         return np.array([fast, fast_back, half, stiffness, 1.0, 1.0, 0.0])
     # Scatter can reduce the slow torque to zero or below; the bound then disables that part.
@@ -148,8 +146,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 
 def _small_signal(options: BlimanSorineOptions) -> SmallSignal:
     slow = 0.0 if options.order == 1 else options.slow_stiffness or 0.0
-    bristles = Presliding(options.bristle_stiffness - slow, 0.0)
-    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
+    return SmallSignal.of_bristles(options.bristle_stiffness - slow)
 
 
 def _stored_energy(options: BlimanSorineOptions, state: Array) -> float:
@@ -177,7 +174,7 @@ def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
         "slow_stiffness", "slow_stiffness", "N m/rad", "Stiffness of the slow part.", PRESLIDE,
         slow_stiffness,
     )  # fmt: skip
-    own = line(sizes, by_direction=by_direction)
+    own = line(sizes, by_direction)
     return (*own, *peak, stiffness(sizes), share, slow)
 
 

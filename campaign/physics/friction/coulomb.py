@@ -20,7 +20,7 @@ from campaign.physics.friction.interface import (
     FrictionOptions,
     SmallSignal,
 )
-from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.stribeck import in_direction, mean_viscous, odd_viscous
 from campaign.physics.friction.unknowns import line
 from campaign.physics.step_function import Motion
 from campaign.units import RotationalDamping, Torque
@@ -62,10 +62,8 @@ def steady_state(options: Any, velocity: Array) -> Array:
 
 def _parameters(options: CoulombOptions) -> Array:
     """Tc forwards and backwards (N m), and half the difference of sigma2 (N m s/rad)."""
-    torques, viscous = (
-        [in_direction(options, name, sign) for sign in (1.0, -1.0)] for name in CURVE
-    )
-    return np.array([*torques, 0.5 * (viscous[0] - viscous[1])])
+    torques = [in_direction(options, "coulomb_torque", sign) for sign in (1.0, -1.0)]
+    return np.array([*torques, odd_viscous(options)])
 
 
 def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
@@ -103,5 +101,5 @@ FRICTION = FrictionModel(
         sliding=_sliding,
         static_torque=lambda options, direction: in_direction(options, "coulomb_torque", direction),
     ),
-    unknowns=lambda sizes, by_direction: line(sizes, by_direction=by_direction),
+    unknowns=line,
 )

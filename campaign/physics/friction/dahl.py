@@ -25,11 +25,10 @@ from campaign.physics.friction.interface import (
     Array,
     FrictionModel,
     FrictionOptions,
-    Presliding,
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of, sign_of
-from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.stribeck import in_direction, mean_viscous, odd_viscous
 from campaign.physics.friction.unknowns import line, stiffness
 from campaign.physics.step_function import Motion
 from campaign.units import RotationalDamping, RotationalStiffness, Torque
@@ -54,9 +53,8 @@ class DahlOptions(FrictionOptions):
 
 def _parameters(options: DahlOptions) -> Array:
     forwards, backwards = (in_direction(options, "coulomb_torque", sign) for sign in (1.0, -1.0))
-    viscous = [in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0)]
-    half = 0.5 * (viscous[0] - viscous[1])
-    return np.array([forwards, backwards, half, options.bristle_stiffness, options.exponent])
+    own = [options.bristle_stiffness, options.exponent]
+    return np.array([forwards, backwards, odd_viscous(options), *own])
 
 
 def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
@@ -118,11 +116,6 @@ def _step_for(options: DahlOptions) -> Callable[..., Any]:
     return _exponential_step if options.exponent == 1.0 else _step
 
 
-def _small_signal(options: DahlOptions) -> SmallSignal:
-    bristles = Presliding(options.bristle_stiffness, 0.0)
-    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
-
-
 FRICTION = FrictionModel(
     name="dahl",
     summary="dynamic: Coulomb friction with presliding that depends on the path alone (Eq. 3.8)",
@@ -135,12 +128,9 @@ FRICTION = FrictionModel(
     switches=lambda options: 1,
     changeable=(*CURVE, "bristle_stiffness"),
     added=("viscous_friction",),
-    small_signal=_small_signal,
+    small_signal=lambda options: SmallSignal.of_bristles(options.bristle_stiffness),
     # The power loss is T v (1 - y^i), never negative: y < 1 if T has the sign of v, else > 1.
     stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),
     step_for=_step_for,
-    unknowns=lambda sizes, by_direction: (
-        *line(sizes, by_direction=by_direction),
-        stiffness(sizes),
-    ),
+    unknowns=lambda sizes, by_direction: (*line(sizes, by_direction), stiffness(sizes)),
 )

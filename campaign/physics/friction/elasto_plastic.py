@@ -21,7 +21,7 @@ from pydantic import Field
 
 from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import sin, where
-from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
+from campaign.physics.friction.interface import Array, FrictionModel
 from campaign.physics.friction.lugre import FRICTION as LUGRE
 from campaign.physics.friction.lugre import LuGreOptions
 from campaign.physics.friction.path import decayed, parts_of, sign_of
@@ -98,11 +98,6 @@ def _bent(parameters: Any, torque: float, moved: float, time: float) -> tuple[fl
     return where(moved != 0.0, direction * new, torque), starts, ends
 
 
-def _small_signal(options: ElastoPlasticOptions) -> SmallSignal:
-    bristles = Presliding(options.bristle_stiffness, options.bristle_damping)
-    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
-
-
 FRICTION = FrictionModel(
     name="elasto-plastic",
     summary="dynamic: LuGre's bristles without drift below a deflection (Dupont et al. 2002)",
@@ -114,7 +109,7 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     switches=lambda options: 3,
     changeable=LUGRE.changeable,
-    small_signal=_small_signal,
-    stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),
+    small_signal=LUGRE.small_signal,
+    stored_energy=LUGRE.stored_energy,
     unknowns=LUGRE.unknowns,
 )

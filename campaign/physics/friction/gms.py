@@ -31,7 +31,7 @@ from pydantic import Field
 from campaign.physics.compilation import called
 from campaign.physics.elementary import exp, where
 from campaign.physics.friction.elements import ElementOptions, count_of, shares_of
-from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
+from campaign.physics.friction.interface import Array, FrictionModel, SmallSignal
 from campaign.physics.friction.path import decayed, parts_of, sign_of
 from campaign.physics.friction.stribeck import (
     CURVE,
@@ -128,11 +128,6 @@ def _slid(
     return where(moves, mean, held), where(moves, total, held)
 
 
-def _small_signal(options: GmsOptions) -> SmallSignal:
-    springs = Presliding(options.bristle_stiffness, 0.0)
-    return SmallSignal(stuck=springs, stuck_compensation=springs)
-
-
 def _stored_energy(options: GmsOptions, state: Array) -> float:
     """Energy of the springs for a flat curve; else NaN."""
     signs = (1.0, -1.0)
@@ -151,7 +146,7 @@ def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
         "attraction", "attraction", "N m/s", "How fast slipping elements approach the curve.",
         1e-3 * usual, 1e6 * usual, 1e2 * usual, SLIDE, logarithmic=True,
     )  # fmt: skip
-    return (*curve(sizes, by_direction=by_direction), stiffness(sizes), attraction)
+    return (*curve(sizes, by_direction), stiffness(sizes), attraction)
 
 
 FRICTION = FrictionModel(
@@ -165,7 +160,7 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     switches=lambda options: 1 + count_of(options),
     changeable=(*CURVE, "bristle_stiffness", "attraction"),
-    small_signal=_small_signal,
+    small_signal=lambda options: SmallSignal.of_bristles(options.bristle_stiffness),
     stored_energy=_stored_energy,
     unknowns=_unknowns,
 )

@@ -7,17 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self, get_args, get_origin
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ModelWrapValidatorHandler, model_validator
 from pydantic.fields import FieldInfo
 
+from campaign.arrays import Array as Array
 from campaign.axis_kind import axis_terms, current_sides
 from campaign.options import Options
 from campaign.physics.friction.unknowns import Sizes, Unknowns
 from campaign.units import TORQUE, Phase, Quantity
-
-Array = NDArray[np.float64]
 
 
 class Ripple(Options):
@@ -101,6 +98,12 @@ class SmallSignal:
     stuck: Presliding | None
     stuck_compensation: Presliding | None
     sliding_damping: float = 0.0
+
+    @classmethod
+    def of_bristles(cls, stiffness: float, damping: float = 0.0) -> SmallSignal:
+        """Response of bristles, which is the same as friction and as a compensation."""
+        bristles = Presliding(stiffness, damping)
+        return cls(stuck=bristles, stuck_compensation=bristles)
 
 
 def _always(options: Any) -> bool:

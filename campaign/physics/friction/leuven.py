@@ -29,7 +29,7 @@ from pydantic import Field
 from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import power, where
 from campaign.physics.friction.elements import ElementOptions, count_of, shares_of
-from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
+from campaign.physics.friction.interface import Array, FrictionModel
 from campaign.physics.friction.lugre import FRICTION as LUGRE
 from campaign.physics.friction.lugre import LuGreOptions
 from campaign.physics.friction.path import decayed, parts_of, sign_of
@@ -150,11 +150,6 @@ def _held(torque: float, most: float) -> float:
     return held
 
 
-def _small_signal(options: LeuvenOptions) -> SmallSignal:
-    bristles = Presliding(options.bristle_stiffness, options.bristle_damping)
-    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
-
-
 FRICTION = FrictionModel(
     name="leuven",
     summary="dynamic: LuGre's equation over N Maxwell-slip elements (Eq. 3.19 to 3.22)",
@@ -166,6 +161,6 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     switches=lambda options: 2 + count_of(options),
     changeable=LUGRE.changeable,
-    small_signal=_small_signal,
+    small_signal=LUGRE.small_signal,
     unknowns=LUGRE.unknowns,
 )

@@ -20,7 +20,6 @@ from campaign.physics.friction.interface import (
     Array,
     FrictionModel,
     FrictionOptions,
-    Presliding,
     SmallSignal,
 )
 from campaign.physics.friction.stribeck import (
@@ -145,8 +144,7 @@ def _step_for(options: LuGreOptions) -> Callable[..., Any]:
 
 def _small_signal(options: LuGreOptions) -> SmallSignal:
     """At rest dz/dt = v: a spring and a damper. In fast sliding z = s(v) / sigma0 is constant."""
-    bristles = Presliding(options.bristle_stiffness, options.bristle_damping)
-    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
+    return SmallSignal.of_bristles(options.bristle_stiffness, options.bristle_damping)
 
 
 def _stored_energy(options: LuGreOptions, state: Array) -> float:
@@ -168,5 +166,5 @@ FRICTION = FrictionModel(
     small_signal=_small_signal,
     stored_energy=_stored_energy,
     step_for=_step_for,
-    unknowns=lambda sizes, by_direction: bristles(sizes, by_direction=by_direction),
+    unknowns=bristles,
 )

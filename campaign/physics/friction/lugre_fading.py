@@ -21,7 +21,7 @@ from pydantic import Field
 from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import exp, where
 from campaign.physics.friction.dahl import relaxed
-from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
+from campaign.physics.friction.interface import Array, FrictionModel
 from campaign.physics.friction.lugre import FRICTION as LUGRE
 from campaign.physics.friction.lugre import LuGreOptions
 from campaign.physics.friction.path import parts_of, sign_of
@@ -98,18 +98,13 @@ def _bent(
     return after, starts, ends, _damping(parameters, speed) * (after - torque)
 
 
-def _small_signal(options: FadingOptions) -> SmallSignal:
-    bristles = Presliding(options.bristle_stiffness, options.bristle_damping)
-    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
-
-
 def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
     fading = FrictionUnknown(
         "damping_velocity", "damping_velocity", "rad/s", "Rate at which sigma1 has fallen to 37 %.",
         1e-4 * sizes.rate, 10.0 * sizes.rate, 0.1 * sizes.rate, PRESLIDE, logarithmic=True,
         lasts=BENDING,
     )  # fmt: skip
-    return (*bristles(sizes, by_direction=by_direction), fading)
+    return (*bristles(sizes, by_direction), fading)
 
 
 FRICTION = FrictionModel(
@@ -123,7 +118,7 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     switches=lambda options: 1,
     changeable=(*(LUGRE.changeable or ()), "damping_velocity"),
-    small_signal=_small_signal,
+    small_signal=LUGRE.small_signal,
     stored_energy=LUGRE.stored_energy,
     unknowns=_unknowns,
 )

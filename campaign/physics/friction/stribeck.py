@@ -96,29 +96,25 @@ def in_direction(options: Any, name: str, sign: float) -> float:
 
 
 def curve_parameters(options: Any) -> list[float]:
-    """Tc, Ts, vs, delta forwards, the same backwards, and half the difference of sigma2.
-
-    The mean of sigma2 over both directions belongs to the linear part; a step function adds the
-    half difference times |v|.
-    """
+    """Tc, Ts, vs, delta forwards, the same backwards, and `odd_viscous`."""
     names = ("coulomb_torque", "static_torque", "stribeck_velocity", "stribeck_exponent")
     return [
         *(in_direction(options, name, +1.0) for name in names),
         *(in_direction(options, name, -1.0) for name in names),
-        0.5
-        * (
-            in_direction(options, "viscous_friction", +1.0)
-            - in_direction(options, "viscous_friction", -1.0)
-        ),
+        odd_viscous(options),
     ]
 
 
 def mean_viscous(options: Any) -> float:
-    """sigma2 (N m s/rad), the mean of both directions."""
-    return 0.5 * (
-        in_direction(options, "viscous_friction", +1.0)
-        + in_direction(options, "viscous_friction", -1.0)
-    )
+    """sigma2 (N m s/rad), the mean of both directions: the linear part."""
+    forwards, backwards = (in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0))
+    return 0.5 * (forwards + backwards)
+
+
+def odd_viscous(options: Any) -> float:
+    """Half the difference of sigma2 (N m s/rad); a step function adds it times |v|."""
+    forwards, backwards = (in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0))
+    return 0.5 * (forwards - backwards)
 
 
 def stribeck_curve(options: Any, velocity: Array) -> Array:
@@ -213,5 +209,5 @@ FRICTION = FrictionModel(
         static_torque=lambda options, direction: in_direction(options, "static_torque", direction),
         jumps=lambda options: options.sign_smoothing == 0.0,
     ),
-    unknowns=lambda sizes, by_direction: curve(sizes, by_direction=by_direction),
+    unknowns=curve,
 )

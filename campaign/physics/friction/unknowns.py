@@ -113,7 +113,7 @@ BENDING = ReversalTime(
 )
 
 
-def line(sizes: Sizes, *, by_direction: bool) -> Unknowns:
+def line(sizes: Sizes, by_direction: bool) -> Unknowns:
     """Coulomb and viscous friction."""
     mean = sizes.torque
     largest = max(0.5 * sum(sizes.viscous), 0.02 * mean / sizes.rate)
@@ -180,7 +180,7 @@ def static(
     return tuple(unknowns)
 
 
-def curve(sizes: Sizes, *, by_direction: bool) -> Unknowns:
+def curve(sizes: Sizes, by_direction: bool) -> Unknowns:
     """Coulomb, static and viscous friction, and the rate between them."""
     slow = FrictionUnknown(
         "stribeck_velocity", "stribeck_velocity", "rad/s",
@@ -190,7 +190,7 @@ def curve(sizes: Sizes, *, by_direction: bool) -> Unknowns:
     )  # fmt: skip
     # Friction can rise to Coulomb friction in one direction, and fall to it in the other.
     return (
-        *line(sizes, by_direction=by_direction),
+        *line(sizes, by_direction),
         # Without the Stribeck velocity, static friction is an extrapolation.
         *static(PASSING, by_direction=by_direction, rests_on=((slow.name,),)),
         slow,
@@ -224,9 +224,9 @@ def damping(sizes: Sizes) -> FrictionUnknown:
     )  # fmt: skip
 
 
-def bristles(sizes: Sizes, *, by_direction: bool) -> Unknowns:
+def bristles(sizes: Sizes, by_direction: bool) -> Unknowns:
     """A Stribeck curve with bristles."""
-    return (*curve(sizes, by_direction=by_direction), stiffness(sizes), damping(sizes))
+    return (*curve(sizes, by_direction), stiffness(sizes), damping(sizes))
 
 
 def _ways(by_direction: bool) -> tuple[tuple[str, str, str], ...]:

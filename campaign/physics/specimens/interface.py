@@ -6,12 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from campaign.arrays import Array as Array
 from campaign.options import Options
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

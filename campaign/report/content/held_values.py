@@ -20,7 +20,6 @@ from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import why_altered
 from campaign.physics.bench_knowledge import NORMAL_95
 from campaign.physics.compensation.identified import identified_name
-from campaign.physics.loop import at_load
 from campaign.physics.true_values import true_of, true_value
 from campaign.published.values import Cell as PublishedCell
 from campaign.published.values import Published, heading_of
@@ -153,7 +152,7 @@ def _as_bench(bench: Bench, name: str) -> Bench | None:
         return bench.model_copy(update={"axis": bench.axis.model_copy(update={"inertia": inertia})})
     if options.method != "friction-model":
         return None
-    if any(at_load(each, bench) != (1.0, 1.0) for each in options.friction.values()):
+    if any(bench.at_load(each) != (1.0, 1.0) for each in options.friction.values()):
         return None
     return bench.model_copy(update={"friction": options.friction})
 
@@ -167,7 +166,7 @@ def _number(bench: Bench, quantity: str, conditions: Mapping[str, str]) -> float
         own = getattr(options, DAMPING, None)
         if own is None:
             return None
-        torque, rate = at_load(options, bench)
+        torque, rate = bench.at_load(options)
         dampings.append(torque * rate * own)
     return math.fsum(dampings) if dampings else None
 
