@@ -22,12 +22,7 @@ from campaign.backends.handover.acceptance import (
     not_completed,
 )
 from campaign.backends.handover.columns import first_mapping, layout_of, read_layouts
-from campaign.backends.handover.excitation import (
-    excitation,
-    facts_of,
-    write_csv,
-    write_mat,
-)
+from campaign.backends.handover.excitation import excitation, facts_of, write_csv, write_mat
 from campaign.backends.handover.handover_folder import (
     MANIFEST,
     PAGE,
@@ -41,13 +36,7 @@ from campaign.backends.handover.handover_folder import (
     read_json,
     write_text,
 )
-from campaign.backends.handover.pages import (
-    Row,
-    attempt_page,
-    columns_file,
-    first_page,
-    manifest,
-)
+from campaign.backends.handover.pages import Row, attempt_page, columns_file, first_page, manifest
 from campaign.backends.handover.returned_recording import (
     ColumnsError,
     OtherRateError,

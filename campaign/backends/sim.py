@@ -10,13 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from pydantic import Field
 
 from campaign.backends.interface import BackendKind, Source, StopFlag, TrialCost
-from campaign.backends.simulated_trial import (
-    CHANNELS,
-    MEASURED,
-    OUTPUTS,
-    SimulatedTrial,
-    announced,
-)
+from campaign.backends.simulated_trial import CHANNELS, MEASURED, OUTPUTS, SimulatedTrial, announced
 from campaign.backends.step_check import StepCheck
 from campaign.options import Options
 from campaign.physics.bench import Bench

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from campaign.calibration.space import Parameter, Space
-from campaign.calibration.targets import (
-    DEFAULT_WEIGHT,
-    Target,
-    make_target,
-    weight_of,
-)
+from campaign.calibration.targets import DEFAULT_WEIGHT, Target, make_target, weight_of
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.estimation.unknowns import Unknown
 from campaign.physics.bench import Bench

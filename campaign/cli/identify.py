@@ -11,13 +11,7 @@ from campaign.archive import find_run
 from campaign.archive.layout.files import why, write_atomically
 from campaign.axis_kind import axis_terms
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import (
-    print_line,
-    print_note,
-    print_table,
-    print_warning,
-    waiting,
-)
+from campaign.cli.output import print_line, print_note, print_table, print_warning, waiting
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code, writing
 from campaign.estimate import Origin
 from campaign.identify import experiments_by_model

@@ -16,11 +16,7 @@ from campaign.archive import RunReader, find_run, open_run
 from campaign.cli.output import print_note, print_table, print_warning
 from campaign.errors import DEBUG, ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.interrupts import unwinding
-from campaign.report.processes import (
-    begin_early,
-    choose_processes,
-    workers,
-)
+from campaign.report.processes import begin_early, choose_processes, workers
 
 if TYPE_CHECKING:
     from campaign.archive.writing.results_file import PreparedResults

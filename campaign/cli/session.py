@@ -16,12 +16,7 @@ from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.layout.header import SEALED
 from campaign.archive.layout.journal import TrialsFollowed
 from campaign.backends import calls
-from campaign.backends.interface import (
-    Backend,
-    BackendKind,
-    SupportsHolder,
-    SupportsTiming,
-)
+from campaign.backends.interface import Backend, BackendKind, SupportsHolder, SupportsTiming
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop

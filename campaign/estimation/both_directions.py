@@ -13,13 +13,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import refused
 from campaign.estimation.intervals import shifted_by, with_error
 from campaign.estimation.stribeck import PARAMETERS
-from campaign.estimation.velocity_map import (
-    FORM,
-    DirectionFit,
-    Model,
-    fitted_estimates,
-    is_bent,
-)
+from campaign.estimation.velocity_map import FORM, DirectionFit, Model, fitted_estimates, is_bent
 from campaign.reason import Cause
 
 TOGETHER = "mean of both directions, their errors taken for the same"

@@ -14,11 +14,7 @@ import numpy as np
 
 from campaign.arrays import Array, Flags
 from campaign.estimation.autocorrelated_errors import FitErrors, errors_of
-from campaign.estimation.presliding_curve import (
-    Interface,
-    angle_derivatives,
-    presliding_angle,
-)
+from campaign.estimation.presliding_curve import Interface, angle_derivatives, presliding_angle
 from campaign.estimation.torque_ramp import FEWEST_BINS, Ramp
 
 EVALUATIONS = 100

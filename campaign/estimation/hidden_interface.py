@@ -17,11 +17,7 @@ import numpy as np
 from campaign.estimation.autocorrelated_errors import whitened
 from campaign.estimation.bristle_fit import BristleFit
 from campaign.estimation.intervals import student
-from campaign.estimation.presliding_curve import (
-    Interface,
-    angle_derivatives,
-    presliding_angle,
-)
+from campaign.estimation.presliding_curve import Interface, angle_derivatives, presliding_angle
 
 SHARES = (0.1, 0.15, 0.2, 0.3, 0.4)
 """Shares of the torque of a hidden interface. A smaller share is never resolved: half of the first

@@ -16,13 +16,7 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import (
-    LEVEL,
-    NO_STANDARD_ERROR,
-    of_repeats,
-    shifted_by,
-    student,
-)
+from campaign.estimation.intervals import LEVEL, NO_STANDARD_ERROR, of_repeats, shifted_by, student
 from campaign.reason import Cause
 
 SAMPLES = "time between samples"

@@ -17,12 +17,7 @@ from numpy.typing import NDArray
 
 from campaign.arrays import Array
 from campaign.estimate import OF_ONE_TRIAL, Estimate
-from campaign.estimation.intervals import (
-    exponential,
-    of_positive_repeats,
-    ratio,
-    with_error,
-)
+from campaign.estimation.intervals import exponential, of_positive_repeats, ratio, with_error
 from campaign.estimation.sampled_curve import LOST
 from campaign.reason import Cause, Reason
 

@@ -30,12 +30,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.curve_misfit import CurveMisfit, curve_misfit
 from campaign.estimation.gate import USELESS, admitted, mattering, refused
 from campaign.estimation.intervals import shifted_by, student, with_error
-from campaign.estimation.least_squares import (
-    gradients,
-    profile_limit,
-    propagated,
-    refuse_too_few,
-)
+from campaign.estimation.least_squares import gradients, profile_limit, propagated, refuse_too_few
 from campaign.estimation.point_weights import (
     Scatter,
     fit_with_scatter,

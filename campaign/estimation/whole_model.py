@@ -16,11 +16,7 @@ from campaign.axis_kind import axis_unit
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import USELESS
 from campaign.estimation.intervals import LEVEL
-from campaign.estimation.inverse.regression import (
-    Piece,
-    Regression,
-    fitted,
-)
+from campaign.estimation.inverse.regression import Piece, Regression, fitted
 from campaign.estimation.least_squares import covariance
 from campaign.estimation.multi_start import (
     Display,

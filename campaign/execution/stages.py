@@ -24,13 +24,7 @@ from campaign.channels import missing
 from campaign.errors import CampaignError, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.safety import describe
-from campaign.experiments.interface import (
-    Experiment,
-    TestData,
-    TrialData,
-    bench_of,
-    options_of,
-)
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, options_of
 from campaign.protocol.stage_trials import Refusal, StageTrials, TooMuchError, follow
 from campaign.protocol.stages import PlannedStage, place_of
 from campaign.reason import Cause

@@ -32,17 +32,7 @@ from campaign.experiments.shared.friction_models import (
 )
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import (
-    Array,
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Array, Axis, Column, Curve, Figure, Finding, Panel, Result, Table
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import AngularRate, Torque, TorqueRate

@@ -34,17 +34,7 @@ from campaign.experiments.shared.friction_models import (
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
-from campaign.result import (
-    Array,
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Array, Axis, Column, Curve, Figure, Finding, Panel, Result, Table
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import AngularRate, Frequency

@@ -25,17 +25,7 @@ from campaign.experiments.shared.friction_models import ConditionGroup, in_model
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
-from campaign.result import (
-    Array,
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Array, Axis, Column, Curve, Figure, Finding, Panel, Result, Table
 from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, Frequency, in_words

@@ -39,14 +39,7 @@ from campaign.experiments.interface import Experiment, TestData, TrialData, key
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.systematic import shared_parts
 from campaign.reason import Cause
-from campaign.result import (
-    Cell,
-    Column,
-    Finding,
-    Result,
-    Table,
-    Value,
-)
+from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.trial import canonical_json
 
 DOUBTFUL = Cause("doubtful values", "{doubtful} of {values} values are {origins}")

@@ -14,11 +14,7 @@ from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import of_repeats
 from campaign.estimation.rise_time import rise_interval
 from campaign.estimation.sampled_curve import drop_interval_if_deterministic
-from campaign.estimation.step_response import (
-    NOT_SETTLED,
-    StepCharacteristics,
-    step_characteristics,
-)
+from campaign.estimation.step_response import NOT_SETTLED, StepCharacteristics, step_characteristics
 from campaign.experiments.interface import Experiment, TestData, TrialData, key, metrics, validated
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.captions import duration

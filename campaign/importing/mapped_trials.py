@@ -27,13 +27,7 @@ from campaign.importing.description import (
     file_used,
     label,
 )
-from campaign.importing.mapping import (
-    ColumnPlace,
-    Layout,
-    MappingError,
-    RecordingEntry,
-    TimeColumn,
-)
+from campaign.importing.mapping import ColumnPlace, Layout, MappingError, RecordingEntry, TimeColumn
 from campaign.importing.open_files import OpenedFiles
 from campaign.importing.reader import RecordingReader
 from campaign.importing.trial_rows import NEEDED, Stretch, by_restart, by_trigger, by_value

@@ -11,13 +11,7 @@ from dataclasses import dataclass, field
 
 from campaign.errors import BackendError
 from campaign.link.connection import Connection
-from campaign.link.errors import (
-    HeldError,
-    RefusedError,
-    ResetError,
-    SilenceError,
-    StoppedError,
-)
+from campaign.link.errors import HeldError, RefusedError, ResetError, SilenceError, StoppedError
 from campaign.link.panic import panic_stop_of
 from campaign.link.safe import is_safe
 from campaign.plain_text import printable

@@ -73,13 +73,7 @@ from campaign.physics.rows import (
     RELATIVE_ANGLE,
 )
 from campaign.physics.sampled_controller import sample
-from campaign.physics.vector import (
-    LANES,
-    by_lanes,
-    in_columns,
-    in_rows,
-    rows_on_the_stack,
-)
+from campaign.physics.vector import LANES, by_lanes, in_columns, in_rows, rows_on_the_stack
 
 
 @inlined

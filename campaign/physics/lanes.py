@@ -12,14 +12,7 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.physics.base_motion import base_rate
-from campaign.physics.blocks import (
-    Controller,
-    Elements,
-    Memory,
-    System,
-    by_lane,
-    zeros,
-)
+from campaign.physics.blocks import Controller, Elements, Memory, System, by_lane, zeros
 from campaign.physics.compensation.interface import Compensator
 from campaign.physics.complete import CompleteBench
 from campaign.physics.friction import jumps

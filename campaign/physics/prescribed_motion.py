@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from campaign.physics.blocks import (
-    Array,
-    Elements,
-    Memory,
-    elements_of,
-    memory_of,
-)
+from campaign.physics.blocks import Array, Elements, Memory, elements_of, memory_of
 from campaign.physics.compilation import entry
 from campaign.physics.friction_lines import (
     ask,

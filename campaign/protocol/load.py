@@ -22,13 +22,7 @@ from campaign.protocol.collect import (
     sibling,
     top_level,
 )
-from campaign.protocol.files import (
-    Origin,
-    PatchedTree,
-    Source,
-    Within,
-    read_source,
-)
+from campaign.protocol.files import Origin, PatchedTree, Source, Within, read_source
 from campaign.protocol.further_files import FurtherFiles, read_any_text
 from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.matrix import Axis

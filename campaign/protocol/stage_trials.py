@@ -10,12 +10,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.limits import margins
 from campaign.physics.plan_loops import loops_used
 from campaign.physics.resolution import resolution_margins
-from campaign.protocol.expand import (
-    check_recording,
-    fields_of,
-    place_hash,
-    samples_of,
-)
+from campaign.protocol.expand import check_recording, fields_of, place_hash, samples_of
 from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.points import first_line
 from campaign.protocol.schema import ExperimentKind

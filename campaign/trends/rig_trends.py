@@ -23,20 +23,8 @@ from campaign.estimation.trends.changes import Change, Jump, Trend, change, dete
 from campaign.estimation.trends.scatter import Mixture
 from campaign.experiments.interface import Experiment
 from campaign.reason import NONE, Cause, Reason
-from campaign.trends.covariates import (
-    ORDER,
-    TIME,
-    Covariate,
-    covariate_of,
-    together,
-)
-from campaign.trends.members import (
-    LEAST,
-    Member,
-    changes_before,
-    members_of,
-    with_exchanged,
-)
+from campaign.trends.covariates import ORDER, TIME, Covariate, covariate_of, together
+from campaign.trends.members import LEAST, Member, changes_before, members_of, with_exchanged
 from campaign.trends.models import TrendFit, fit_models
 from campaign.trends.series import SAME_IN_ALL, Series, series_of
 

@@ -15,10 +15,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
-from campaign.archive.layout.journal import (
-    JOURNAL,
-    RunResumed,
-)
+from campaign.archive.layout.journal import JOURNAL, RunResumed
 from campaign.archive.layout.journal_summary import read_journal
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Ending, Fault, Outcome, SafeState

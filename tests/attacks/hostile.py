@@ -24,15 +24,7 @@ from campaign.backends.interface import BackendKind, Source
 from campaign.channels import info
 from campaign.errors import UsageError
 from campaign.options import Options
-from campaign.recording import (
-    ChannelInfo,
-    Ending,
-    Event,
-    Fault,
-    Outcome,
-    PanicStop,
-    SafeState,
-)
+from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, PanicStop, SafeState
 
 if Path("spam").exists():
     print("SPAM: imported")  # noqa: T201 - what many a library does

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from campaign.backends.handover.acceptance import FEWEST, GO_ON, _until_stopped
-from campaign.backends.handover.checks import (
-    clipped,
-    wrong_command,
-    wrong_length,
-    wrong_motion,
-)
+from campaign.backends.handover.checks import clipped, wrong_command, wrong_length, wrong_motion
 from campaign.backends.handover.returned_recording import ReturnedRecording
 from campaign.channels import info
 from campaign.signals import Polyline, Sine

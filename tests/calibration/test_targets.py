@@ -7,13 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from campaign.calibration.targets import (
-    Target,
-    make_target,
-    restricted,
-    shortest,
-    weight_of,
-)
+from campaign.calibration.targets import Target, make_target, restricted, shortest, weight_of
 from campaign.published.patterns import covers
 from campaign.published.values import Cell, thesis
 from campaign.published.verdicts import ReproducedNumber, deviation, judge

@@ -7,12 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from campaign.device.temperature import (
-    ROOM,
-    THERMAL_RESISTANCE,
-    TIME_CONSTANT,
-    Winding,
-)
+from campaign.device.temperature import ROOM, THERMAL_RESISTANCE, TIME_CONSTANT, Winding
 
 
 def test_a_current_heats_it_towards_what_its_loss_keeps() -> None:

@@ -22,11 +22,7 @@ from campaign.estimation.inverse.motion import (
 )
 from campaign.estimation.inverse.position_period import find_period
 from campaign.estimation.inverse.presliding_share import deflection
-from campaign.estimation.inverse.regression import (
-    Piece,
-    effective_count,
-    regress,
-)
+from campaign.estimation.inverse.regression import Piece, effective_count, regress
 from campaign.estimation.inverse.rows import in_blocks, moving, rows
 from campaign.estimation.inverse.simulation import driven_motion
 from campaign.estimation.inverse.structure_choice import choose, held_out, structure

@@ -13,12 +13,7 @@ import pytest
 
 from campaign.experiments import experiments
 from campaign.experiments.analysis import result_of
-from campaign.experiments.interface import (
-    Experiment,
-    TestData,
-    bench_of,
-    options_of,
-)
+from campaign.experiments.interface import Experiment, TestData, bench_of, options_of
 from campaign.options import describe
 from campaign.protocol import check_limits, load_protocol, make_plan
 from campaign.trial import Most

@@ -10,9 +10,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import with_error
-from campaign.experiments.stabilization.comparisons import (
-    beside_rows,
-)
+from campaign.experiments.stabilization.comparisons import beside_rows
 from campaign.experiments.stabilization.experiment import EXPERIMENT, StabilizationOptions
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
 from tests.physics.benches import bench

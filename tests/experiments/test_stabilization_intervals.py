@@ -22,14 +22,7 @@ from campaign.physics.bench import Bench
 from campaign.reason import NONE
 from campaign.trial import Trial
 from tests.estimation.coverage import holds, rejected
-from tests.experiments.laboratory import (
-    Done,
-    analyse,
-    execute,
-    finding,
-    table_of_estimates,
-    trials,
-)
+from tests.experiments.laboratory import Done, analyse, execute, finding, table_of_estimates, trials
 
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
 METHODS = [{"compensation": name} for name in ("none", "static", "lugre", "observer")]

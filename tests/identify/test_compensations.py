@@ -12,11 +12,7 @@ import tomlkit
 
 from campaign.estimate import Estimate
 from campaign.identify import experiments_by_model
-from campaign.identify.compensations import (
-    Entries,
-    identified_compensations,
-    without_identified,
-)
+from campaign.identify.compensations import Entries, identified_compensations, without_identified
 from campaign.identify.identification import Identification, Section, _with_place
 from campaign.parameter import IdentifiedRig, Parameter
 from campaign.physics.bench import Bench

@@ -11,15 +11,7 @@ from campaign.cli.identify import identify_run
 from campaign.errors import NoResultError
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.friction_map.curves import places
-from tests.identify.unseen import (
-    curve,
-    identified,
-    imported,
-    notes,
-    random,
-    staircase,
-    told,
-)
+from tests.identify.unseen import curve, identified, imported, notes, random, staircase, told
 
 RATE = 200.0
 

@@ -7,13 +7,7 @@ import pytest
 from campaign.link.safe import SafeWatch, is_safe
 from campaign.wire.codes import Fault, Kind, LatchCause, State
 from campaign.wire.frames import encode_frame
-from campaign.wire.messages import (
-    Ack,
-    Latch,
-    Message,
-    Status,
-    encode,
-)
+from campaign.wire.messages import Ack, Latch, Message, Status, encode
 
 HEARD = Ack(0, Kind.SAFE, State.SAFE, 1)
 """It has heard our SAFE: what it said before counts for nothing."""

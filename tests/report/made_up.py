@@ -17,17 +17,7 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.recording import ChannelInfo, Ending, Outcome, Recording, SafeState
 from campaign.report.build import Report, build_report
-from campaign.result import (
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Mark,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Axis, Column, Curve, Figure, Finding, Mark, Panel, Result, Table
 from campaign.trial import Task, Trial
 from campaign.units import AngularAcceleration, Frequency
 

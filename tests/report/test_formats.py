@@ -29,16 +29,7 @@ from campaign.report.formats import chosen_formats, formats, pdf
 from campaign.report.formats.markdown import escaped, paragraph
 from campaign.report.formats.pdf import unfolded
 from campaign.report.latex_text import breakable, cell_numbers, column_head, latex
-from campaign.result import (
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table
 
 HOSTILE = (
     "<script>alert(1)</script> **b** _i_ `code` | cell | ![p](x.png) [t](javascript:x) <a@b.c>"

@@ -24,16 +24,7 @@ from campaign.report.content.citation import citation_of
 from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import FirstScreen
 from campaign.report.content.run_problems import without_trials
-from campaign.result import (
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Axis, Column, Curve, Figure, Finding, Panel, Result, Table
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
 

@@ -9,13 +9,7 @@ from io import StringIO
 import pytest
 
 from campaign.backends import backends
-from campaign.cli.ask import (
-    ASSUMED,
-    AbsentOperator,
-    ConsoleOperator,
-    NotStartedError,
-    allow_motion,
-)
+from campaign.cli.ask import ASSUMED, AbsentOperator, ConsoleOperator, NotStartedError, allow_motion
 from campaign.experiments import experiments
 from campaign.protocol import PlannedTest, load_protocol, make_plan
 from campaign.resources import protocols_folder

@@ -14,13 +14,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    TypeAdapter,
-    field_serializer,
-)
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_serializer
 
 from campaign.archive.layout.files import why
 from campaign.archive.layout.header import PlannedTrial, RunStatus

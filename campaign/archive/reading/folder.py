@@ -12,12 +12,7 @@ from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
 from campaign.archive.layout.header import PARTIAL, PlannedTrial, RunStatus
 from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished
 from campaign.archive.layout.journal_summary import Lines, read_lines
-from campaign.archive.layout.run_folder import (
-    PLAN,
-    parse_plan,
-    read_header,
-    read_text,
-)
+from campaign.archive.layout.run_folder import PLAN, parse_plan, read_header, read_text
 from campaign.archive.reading.archived_metrics import measured_in, with_metrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList

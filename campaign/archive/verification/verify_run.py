@@ -28,12 +28,7 @@ from campaign.archive.reading.sealed_run import NOTES, read_not_kept
 from campaign.archive.verification import consistency
 from campaign.archive.verification.consistency import TrialFacts
 from campaign.archive.verification.entries import EntryCheck, check_entries, places
-from campaign.archive.verification.result import (
-    STRUCTURE,
-    UNREADABLE_HASH,
-    Progress,
-    Verification,
-)
+from campaign.archive.verification.result import STRUCTURE, UNREADABLE_HASH, Progress, Verification
 from campaign.archive.writing.remnants import OWN_FILES
 from campaign.errors import ArchiveError
 

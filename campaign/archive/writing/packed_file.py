@@ -11,13 +11,7 @@ import numpy as np
 
 from campaign.archive.layout.checksums import SeriesDigest
 from campaign.archive.layout.files import keep_umask
-from campaign.archive.layout.packed_trial import (
-    MAGIC,
-    POINTER,
-    PackedSeries,
-    PackedTrial,
-    Place,
-)
+from campaign.archive.layout.packed_trial import MAGIC, POINTER, PackedSeries, PackedTrial, Place
 from campaign.archive.layout.storage import CHUNK, SAMPLE, pack, shuffling_helps
 from campaign.recording import Array
 

@@ -11,12 +11,7 @@ import numpy as np
 from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.rational import RationalFit
-from campaign.estimation.frequency.two_mass_model import (
-    Side,
-    model,
-    model_jacobian,
-    polynomials,
-)
+from campaign.estimation.frequency.two_mass_model import Side, model, model_jacobian, polynomials
 from campaign.reason import Reason
 
 UNITS = {

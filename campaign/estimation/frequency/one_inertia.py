@@ -7,12 +7,7 @@ import math
 import numpy as np
 
 from campaign.arrays import Array
-from campaign.estimation.frequency.drive import (
-    UNITS,
-    TwoMass,
-    correlations_of,
-    not_determined,
-)
+from campaign.estimation.frequency.drive import UNITS, TwoMass, correlations_of, not_determined
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.rational import rational_fit

@@ -22,11 +22,7 @@ from campaign.estimation.frequency.drive import PARTS, UNITS, TwoMass, correlati
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.one_inertia import load_side_fit, rigid_fit
-from campaign.estimation.frequency.rational import (
-    Weights,
-    condition_of,
-    judged_fit,
-)
+from campaign.estimation.frequency.rational import Weights, condition_of, judged_fit
 from campaign.estimation.frequency.two_mass_model import (
     Side,
     mode_damping,
@@ -36,13 +32,7 @@ from campaign.estimation.frequency.two_mass_model import (
     starts,
 )
 from campaign.estimation.intervals import TORQUE_CONSTANT, shifted_by
-from campaign.estimation.least_squares import (
-    Minimum,
-    covariance,
-    gradients,
-    minimum,
-    propagated,
-)
+from campaign.estimation.least_squares import Minimum, covariance, gradients, minimum, propagated
 from campaign.reason import Cause
 
 ROUGH = 10

@@ -25,12 +25,7 @@ from campaign.estimation.inverse.instruments import WEAK, InstrumentFit, by_inst
 from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece
 from campaign.estimation.inverse.rows import all_rows, moving
-from campaign.estimation.inverse.simulation import (
-    Loop,
-    driven_motion,
-    find_loop,
-    followed_motion,
-)
+from campaign.estimation.inverse.simulation import Loop, driven_motion, find_loop, followed_motion
 from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.motions import MotionPiece
 

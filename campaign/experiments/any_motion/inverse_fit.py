@@ -20,13 +20,7 @@ from campaign.estimation.inverse.regression import Regression
 from campaign.estimation.inverse.rows import all_rows, rows
 from campaign.estimation.inverse.simulation import relative_rate_error
 from campaign.estimation.inverse.structure_choice import Structure, choose, structure
-from campaign.estimation.inverse.terms import (
-    DIRECTIONAL,
-    SYMMETRIC,
-    TERMS,
-    Term,
-    periodic,
-)
+from campaign.estimation.inverse.terms import DIRECTIONAL, SYMMETRIC, TERMS, Term, periodic
 from campaign.estimation.inverse.validation import Prediction, improvement, relative_error
 from campaign.experiments.any_motion.instrument_estimates import (
     NORMAL_95,

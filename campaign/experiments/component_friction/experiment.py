@@ -20,11 +20,7 @@ from campaign.estimate import Estimate, Systematic, Window
 from campaign.estimation.breakaway_torque import breakaway_torque
 from campaign.estimation.intervals import shifted_by, welch, with_error
 from campaign.estimation.relative_rate import STOP_FACTOR
-from campaign.estimation.scatter import (
-    RESOLUTION,
-    deviation_of_readings,
-    mean_of_readings,
-)
+from campaign.estimation.scatter import RESOLUTION, deviation_of_readings, mean_of_readings
 from campaign.experiments.component_friction.figures import ComponentCurves, component_figure
 from campaign.experiments.interface import (
     Experiment,
@@ -44,15 +40,7 @@ from campaign.physics.friction_paths import torques
 from campaign.physics.limits import worst_friction
 from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
 from campaign.reason import NONE, Cause
-from campaign.result import (
-    Cell,
-    Column,
-    Figure,
-    Finding,
-    Result,
-    Table,
-    Value,
-)
+from campaign.result import Cell, Column, Figure, Finding, Result, Table, Value
 from campaign.signals import Polyline
 from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularRate, Frequency, Time, Torque, TorqueRate, torque_text

@@ -23,10 +23,7 @@ from campaign.estimation.refinement import MOST as MOST_REFINED
 from campaign.estimation.refinement import PHASE_SHARE, refinement
 from campaign.estimation.servo import characteristics
 from campaign.estimation.sine_point import SinePoint, sine_point
-from campaign.experiments.frequency_response.figures import (
-    closed_loop_figures,
-    torque_figure,
-)
+from campaign.experiments.frequency_response.figures import closed_loop_figures, torque_figure
 from campaign.experiments.frequency_response.marks import place_names, servo_figure
 from campaign.experiments.frequency_response.model.analysis import MODEL, identified
 from campaign.experiments.frequency_response.tables import (

@@ -12,12 +12,7 @@ import numpy as np
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, NORMAL_LOAD, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import multiplied
-from campaign.estimation.ripple import (
-    FASTEST,
-    Harmonic,
-    dominant_periods,
-    harmonic,
-)
+from campaign.estimation.ripple import FASTEST, Harmonic, dominant_periods, harmonic
 from campaign.estimation.steadiness import TOO_FEW_COUNTS, drifting
 from campaign.estimation.steady_sliding import SteadySliding, steady_sliding
 from campaign.experiments.friction_map.runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of

@@ -15,12 +15,7 @@ from dataclasses import dataclass, replace
 from campaign.estimate import Estimate
 from campaign.estimation.angle_dependence import OverATurn
 from campaign.estimation.gate import admitted_together, mattering
-from campaign.experiments.friction_map.curves import (
-    COEFFICIENT,
-    FRICTION,
-    Curves,
-    fit_curves,
-)
+from campaign.experiments.friction_map.curves import COEFFICIENT, FRICTION, Curves, fit_curves
 from campaign.experiments.friction_map.points import Point
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.stretches import (

@@ -12,13 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
-from campaign.channels import (
-    DRIVE_TORQUE,
-    JOINT_TORQUE,
-    NORMAL_LOAD,
-    RELATIVE_ANGLE,
-    RELATIVE_RATE,
-)
+from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimation.angle_dependence import OverATurn, over_a_turn
 from campaign.estimation.steady_sliding import steady_sliding
 from campaign.estimation.steady_stretches import SHORTEST_TIME, steady_stretches

@@ -45,15 +45,7 @@ from campaign.experiments.shared.friction_models import (
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
-from campaign.result import (
-    Array,
-    Cell,
-    Column,
-    Figure,
-    Finding,
-    Result,
-    Table,
-)
+from campaign.result import Array, Cell, Column, Figure, Finding, Result, Table
 from campaign.signals import Sine
 from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularRate, Frequency

@@ -27,11 +27,7 @@ from campaign.experiments.interface import (
     key,
     validated,
 )
-from campaign.experiments.observer_gain.figures import (
-    error_figure,
-    noise_figure,
-    rejection_figure,
-)
+from campaign.experiments.observer_gain.figures import error_figure, noise_figure, rejection_figure
 from campaign.experiments.observer_gain.metrics import (
     BY_THEORY,
     Gain,

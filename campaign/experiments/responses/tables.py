@@ -11,13 +11,7 @@ import numpy as np
 from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.best_linear import BestLinear
-from campaign.estimation.frequency.distortion import (
-    WITHIN_NOISE,
-    Distortion,
-    Level,
-    Parity,
-    total,
-)
+from campaign.estimation.frequency.distortion import WITHIN_NOISE, Distortion, Level, Parity, total
 from campaign.estimation.intervals import LEVEL
 from campaign.experiments.responses.sources import Source
 from campaign.reason import Cause

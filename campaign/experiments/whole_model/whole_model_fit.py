@@ -18,12 +18,7 @@ from campaign.estimation.inverse.structure_choice import criterion, structure
 from campaign.estimation.inverse.terms import DIRECTIONAL, TERMS, Term
 from campaign.estimation.inverse.validation import Prediction, improvement, relative_error
 from campaign.estimation.unknowns import Unknown
-from campaign.estimation.whole_model import (
-    ModelFit,
-    fit_model,
-    held_out,
-    refitted,
-)
+from campaign.estimation.whole_model import ModelFit, fit_model, held_out, refitted
 from campaign.experiments.any_motion.inverse_fit import together
 from campaign.experiments.any_motion.motions import MotionPiece, never_moved
 from campaign.experiments.interface import no_progress, say_at

@@ -13,13 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.importing.defects.defect import (
-    Array,
-    Defect,
-    rows_in_words,
-    runs,
-    usual_step,
-)
+from campaign.importing.defects.defect import Array, Defect, rows_in_words, runs, usual_step
 from campaign.text import count
 
 SPANS = (2 * math.pi, 360.0, 1.0, *(float(2**n) for n in range(8, 33)))

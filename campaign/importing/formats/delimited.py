@@ -13,13 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from campaign.importing.cells import is_lost, is_number, name_and_unit
-from campaign.importing.dialect import (
-    SEPARATORS,
-    Dialect,
-    dialect_of,
-    encoding_of,
-    heading,
-)
+from campaign.importing.dialect import SEPARATORS, Dialect, dialect_of, encoding_of, heading
 from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, Table
 from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file, lines_of
 

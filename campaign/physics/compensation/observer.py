@@ -13,11 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
-from campaign.physics.compensation.interface import (
-    CompensationMethod,
-    Compensator,
-    LinearBlock,
-)
+from campaign.physics.compensation.interface import CompensationMethod, Compensator, LinearBlock
 from campaign.units import Inertia, ObserverGain
 
 

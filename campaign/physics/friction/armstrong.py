@@ -31,12 +31,7 @@ from pydantic import Field
 from campaign.options import Options
 from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import where
-from campaign.physics.friction.interface import (
-    Array,
-    FrictionModel,
-    FrictionOptions,
-    SmallSignal,
-)
+from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions, SmallSignal
 from campaign.physics.friction.path import parts_of, sign_of
 from campaign.physics.friction.stribeck import in_direction, mean_viscous, odd_viscous
 from campaign.physics.friction.unknowns import (

@@ -28,12 +28,7 @@ from pydantic import Field, model_validator
 from campaign.options import Options
 from campaign.physics.friction.coulomb import steady_state as coulomb_steady_state
 from campaign.physics.friction.dahl import relaxed
-from campaign.physics.friction.interface import (
-    Array,
-    FrictionModel,
-    FrictionOptions,
-    SmallSignal,
-)
+from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions, SmallSignal
 from campaign.physics.friction.path import parts_of
 from campaign.physics.friction.stribeck import in_direction, mean_viscous, odd_viscous
 from campaign.physics.friction.unknowns import (

@@ -21,12 +21,7 @@ from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import exp, expm1, power, where
 from campaign.physics.friction.coulomb import CURVE, NegativeDirection
 from campaign.physics.friction.coulomb import steady_state as coulomb_steady_state
-from campaign.physics.friction.interface import (
-    Array,
-    FrictionModel,
-    FrictionOptions,
-    SmallSignal,
-)
+from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions, SmallSignal
 from campaign.physics.friction.path import parts_of, sign_of
 from campaign.physics.friction.stribeck import in_direction, mean_viscous, odd_viscous
 from campaign.physics.friction.unknowns import line, stiffness

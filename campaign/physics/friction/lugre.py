@@ -16,12 +16,7 @@ from pydantic import Field
 
 from campaign.physics.compilation import pasted
 from campaign.physics.elementary import any_of, exp, expm1, power, where
-from campaign.physics.friction.interface import (
-    Array,
-    FrictionModel,
-    FrictionOptions,
-    SmallSignal,
-)
+from campaign.physics.friction.interface import Array, FrictionModel, FrictionOptions, SmallSignal
 from campaign.physics.friction.stribeck import (
     CURVE,
     NegativeDirection,

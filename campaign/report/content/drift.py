@@ -11,13 +11,7 @@ from campaign.api.analysis import one_line
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.sound_samples import Trials, without_damaged
-from campaign.channels import (
-    DRIVE_TORQUE,
-    GYRO_RATE,
-    MOTOR_CURRENT,
-    POINTING_ERROR,
-    RELATIVE_RATE,
-)
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, MOTOR_CURRENT, POINTING_ERROR, RELATIVE_RATE
 from campaign.errors import ArchiveError
 from campaign.reason import Cause
 from campaign.recording import Outcome, Recording

@@ -25,13 +25,7 @@ from campaign.published.values import Cell as PublishedCell
 from campaign.published.values import Published, heading_of
 from campaign.report.content.lines import cell_name
 from campaign.report.content.published_columns import cell_of
-from campaign.report.content.truth import (
-    COUNTED,
-    SIMULATED,
-    Benches,
-    held,
-    inside,
-)
+from campaign.report.content.truth import COUNTED, SIMULATED, Benches, held, inside
 from campaign.result import Cell, Column, Table, Value
 from campaign.text import quantity_words
 

@@ -20,14 +20,7 @@ from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
 from campaign.report.content.lines import cell_name, shown_line
 from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
-from campaign.report.drawing.rows import (
-    LEFT,
-    RIGHT,
-    set_rows,
-    signed_decades,
-    word,
-    zero_line,
-)
+from campaign.report.drawing.rows import LEFT, RIGHT, set_rows, signed_decades, word, zero_line
 from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS, Look
 from campaign.text import capitalized, percent
 

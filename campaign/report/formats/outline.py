@@ -13,15 +13,7 @@ from campaign.report.content.lines import ShownLine
 from campaign.report.page.damage_notice import Notice
 from campaign.report.page.folder import FOUND, Comparison, Section, ShownFigure
 from campaign.report.page.layout import Layout
-from campaign.report.page.pieces import (
-    Facts,
-    Grid,
-    Heading,
-    Items,
-    Paragraph,
-    Piece,
-    Source,
-)
+from campaign.report.page.pieces import Facts, Grid, Heading, Items, Paragraph, Piece, Source
 
 
 def outline(layout: Layout, damage: Notice | None) -> Iterator[Piece]:

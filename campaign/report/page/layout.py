@@ -24,14 +24,7 @@ from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits
 from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.page.article import PageParts
-from campaign.report.page.drawings import (
-    OVERVIEW,
-    Drawable,
-    Drawing,
-    Key,
-    Overview,
-    drawings_of,
-)
+from campaign.report.page.drawings import OVERVIEW, Drawable, Drawing, Key, Overview, drawings_of
 from campaign.report.page.folder import (
     Comparison,
     Download,

@@ -11,12 +11,7 @@ import pytest
 
 from campaign.estimation.frequency.best_linear import best_linear
 from campaign.estimation.frequency.distortion import SHARED_LINES, SINGLE_REALISATION, total
-from campaign.estimation.frequency.multisine import (
-    OddGrid,
-    odd_grid,
-    random_phases,
-    repetition,
-)
+from campaign.estimation.frequency.multisine import OddGrid, odd_grid, random_phases, repetition
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.drives import Drive, loop_of, random_drive, simulated
 from tests.estimation.frequency.measured import radius

@@ -13,11 +13,7 @@ from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.frequency.measured_response import MeasuredResponse
-from campaign.estimation.frequency.output_error import (
-    Simulated,
-    output_error,
-    simulated_output,
-)
+from campaign.estimation.frequency.output_error import Simulated, output_error, simulated_output
 from campaign.estimation.frequency.prediction import HeldAgainst, held_against
 from campaign.estimation.frequency.rational import RationalFit
 from campaign.estimation.frequency.two_mass_model import Side
@@ -25,12 +21,7 @@ from campaign.experiments.frequency_response.model.frequency_fit import Band, Fr
 from campaign.experiments.frequency_response.model.tables import drive_name
 from campaign.experiments.interface import TrialData
 from campaign.experiments.responses.signals import Signals, signals, whole_stretches
-from campaign.experiments.responses.sources import (
-    Reading,
-    Source,
-    fitted_part,
-    sources,
-)
+from campaign.experiments.responses.sources import Reading, Source, fitted_part, sources
 from campaign.physics.bench import Bench
 from campaign.reason import Reason
 from campaign.signals import MultiSine

@@ -11,11 +11,7 @@ import numpy as np
 from campaign.estimation.frequency.output_error import Simulated
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit
 from campaign.experiments.frequency_response.model.tables import FINE
-from campaign.experiments.frequency_response.model.validation import (
-    Model,
-    Prediction,
-    Validation,
-)
+from campaign.experiments.frequency_response.model.validation import Model, Prediction, Validation
 from campaign.experiments.responses.figures import FREQUENCY, decibel, gain_label, panels
 from campaign.experiments.responses.sources import fitted_part
 from campaign.experiments.responses.tables import NAME, SENSOR
