@@ -312,13 +312,17 @@ def axis_of(name: str, sides: Sides) -> AxisKind:
     return sides.motor if what is not None and what.side is Side.MOTOR else sides.load
 
 
+def unit_of(name: str, mode: str, sides: Sides) -> str:
+    """Unit of a channel by the motion of its side; "" for a name outside of the vocabulary."""
+    return info(name, mode, axis=axis_of(name, sides)).unit if name in VOCABULARY else ""
+
+
 def in_known_unit(channel: ChannelInfo, mode: str, sides: Sides) -> tuple[ChannelInfo, float]:
     """Convert a channel to the unit of the vocabulary; the channel, and the factor of its samples.
 
     Raises ValueError if no factor converts its unit. Channels of other names keep their unit.
     """
-    known = VOCABULARY.get(channel.name)
-    unit = info(channel.name, mode, axis=axis_of(channel.name, sides)).unit if known else ""
+    unit = unit_of(channel.name, mode, sides)
     # The quantity of a command depends on the closed loop, which may differ in a recording.
     of_commands = {UNITS[sides.load][quantity][0] for quantity, _ in COMMANDS.values()}
     if (

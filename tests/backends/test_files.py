@@ -7,6 +7,7 @@ import itertools
 import json
 import re
 import threading
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +17,13 @@ import pytest
 from scipy.io import loadmat, savemat
 
 from campaign.backends.files import BACKEND, DEFECTS, FilesBackend
+from campaign.backends.handover.columns import first_mapping
 from campaign.errors import ProtocolError, UsageError
 from campaign.recording import Ending, Fault, Outcome, Recording, SafeState
 from campaign.signals import Polyline, Sine
 from campaign.testing import BackendUnderTest, StrictRecorder, backend_checks
 from campaign.trial import Task, Trial
+from tests.archives import plan_of
 from tests.physics.benches import bench
 
 ROOT = Path(__file__).parents[2]
@@ -555,6 +558,16 @@ def test_the_first_mapping_can_be_made_that_of_the_rig(folder: Path) -> None:
     assert "'Sollwert'" in done.ending.reason
     path.write_text(text, encoding="utf-8")
     assert execute(opened(folder)).ending.outcome is Outcome.COMPLETED
+
+
+def test_a_channel_of_the_motor_has_the_unit_of_its_own_motion(tmp_path: Path) -> None:
+    """A screw's motor turns, and its carriage moves straight."""
+    move = '[[test]]\nname = "m"\nkind = "step_response"\nbench = "linear"\n'
+    (trial, *_) = plan_of(tmp_path, move).trials
+    trial = trial.model_copy(update={"requires": ("motor_rate", "relative_rate")})
+    (drafted,) = tomllib.loads(first_mapping([trial]))["columns"].values()
+    assert drafted["motor_rate"]["unit"] == "rad/s"
+    assert drafted["relative_rate"]["unit"] == "m/s"
 
 
 def test_a_mapping_with_mistakes_is_no_hand_over(folder: Path) -> None:

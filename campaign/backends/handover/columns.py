@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from campaign.axis_kind import AxisKind, sides_in
-from campaign.channels import COMMAND, VOCABULARY, KnownBy, info
+from campaign.axis_kind import Sides, sides_in
+from campaign.channels import COMMAND, VOCABULARY, KnownBy, unit_of
 from campaign.errors import Problem, ProtocolError
 from campaign.importing.mapping import Layout, layouts
 from campaign.protocol.files import Source, UnreadableError, read_source
@@ -88,20 +88,20 @@ def first_mapping(trials: Sequence[Trial]) -> str:
 
 def _layout(name: str, mode: str, trials: Sequence[Trial]) -> str:
     required, useful = requested_channels(trials)
-    axis = sides_in(trials[0].bench).load
+    sides = sides_in(trials[0].bench)
     text = f'\n[columns.{name}.time]\ncolumn = "time"\nunit = "s"\n'
     for channel in required:
-        text += "\n" + "\n".join(_entry(name, channel, mode, axis)) + "\n"
+        text += "\n" + "\n".join(_entry(name, channel, mode, sides)) + "\n"
     if useful:
         text += "\n# Of use to some analyses, where the rig records it:\n"
     for channel in useful:
-        text += "\n" + "\n".join(f"# {line}" for line in _entry(name, channel, mode, axis)) + "\n"
+        text += "\n" + "\n".join(f"# {line}" for line in _entry(name, channel, mode, sides)) + "\n"
     return text
 
 
-def _entry(layout: str, name: str, mode: str, axis: AxisKind) -> list[str]:
-    unit = info(name, mode, axis=axis).unit if name in VOCABULARY else ""
-    return [f"[columns.{layout}.{name}]", f'column = "{name}"', f'unit = "{unit or 1}"']
+def _entry(layout: str, name: str, mode: str, sides: Sides) -> list[str]:
+    unit = unit_of(name, mode, sides) or "1"
+    return [f"[columns.{layout}.{name}]", f'column = "{name}"', f'unit = "{unit}"']
 
 
 def can_be_recorded(name: str) -> bool:

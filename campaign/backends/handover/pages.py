@@ -21,7 +21,7 @@ from campaign.backends.handover.handover_folder import (
     Verdict,
     read_json,
 )
-from campaign.channels import VOCABULARY, info, meaning_in_sentence
+from campaign.channels import meaning_in_sentence, unit_of
 from campaign.plain_text import on_a_page
 from campaign.trial import Role, Trial
 
@@ -232,8 +232,7 @@ def _channel(trial: Trial, name: str) -> dict[str, str]:
 
 
 def _unit(trial: Trial, name: str) -> str:
-    axis = sides_in(trial.bench).load
-    return info(name, trial.task.mode, axis=axis).unit if name in VOCABULARY else ""
+    return unit_of(name, trial.task.mode, sides_in(trial.bench))
 
 
 def _row(row: Row, due: str) -> str:
