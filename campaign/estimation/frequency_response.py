@@ -29,6 +29,19 @@ HELD = Cause(
     "the rate leads the torque by {degrees:.0f}° at {frequency:.3g} Hz: a spring holds the axis, "
     "as friction does before it slides (excite until it slides)",
 )
+BESIDE = 2.0**0.5
+"""Ratio of frequencies within which a load on a spring changes the inertia, and friction little."""
+DRY = 0.5 * np.pi - 4.0 / np.pi
+"""Largest share of dry friction in phase with the acceleration, over that in phase with the rate,
+under a sine of torque: where the axis is about to stop (Den Hartog, Trans. ASME 53 (1931) 107)."""
+SURELY = 3.0
+"""Standard deviations by which the inertia must fall: the largest of some hundred differences of
+noisy points exceeds it about once in twenty times."""
+NO_LOAD = Cause(
+    "no load on a spring",
+    "at {frequency:.3g} Hz the inertia in the response does not fall by more than friction "
+    "explains (excite until the axis slides)",
+)
 
 
 @dataclass(frozen=True)
@@ -91,6 +104,29 @@ def held_by_spring(response: Response) -> Reason:
     if np.max(size) <= size[0] or not SPRING < lead < np.pi - SPRING:
         return NONE
     return HELD(frequency=float(told.frequency[0]), degrees=float(np.degrees(lead)))
+
+
+def no_load_at(response: Response, frequency: float) -> Reason:
+    """Why no load swings on a spring at `frequency` (Hz); false where one shows in the response.
+
+    The imaginary part of torque over rate, divided by w, is the inertia that moves. Below its own
+    frequency a load adds to it, above it takes from it. A spring to the ground, as of bristles,
+    only takes from it, and less the higher the frequency: there the inertia rises. Dry friction
+    that slides adds up to `DRY` of its damping.
+    """
+    told = response.told
+    rate, resistance = 2.0 * np.pi * told.frequency, 1.0 / told.values
+    inertia, damping = resistance.imag / rate, np.maximum(resistance.real, 0.0) / rate
+    error = SURELY * told.error / np.abs(told.values) ** 2 / rate
+    below, above = told.frequency < frequency, told.frequency > frequency
+    if not below.any() or not above.any():
+        return NO_LOAD(frequency=frequency)
+    nearest = told.frequency[below][-1], told.frequency[above][0]
+    below &= told.frequency >= min(frequency / BESIDE, nearest[0])
+    above &= told.frequency <= max(frequency * BESIDE, nearest[1])
+    before, after = inertia[below] - DRY * damping[below], inertia[above]
+    fall = np.subtract.outer(before, after) - np.hypot.outer(error[below], error[above])
+    return NONE if np.max(fall) > 0 else NO_LOAD(frequency=frequency)
 
 
 def make_response(points: Sequence[SinePoint]) -> Response:

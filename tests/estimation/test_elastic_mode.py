@@ -10,7 +10,14 @@ import pytest
 
 from campaign.estimate import Origin
 from campaign.estimation.elastic_mode import _freedom, elastic_mode
-from campaign.estimation.frequency_response import HELD, Response, held_by_spring
+from campaign.estimation.frequency_response import (
+    DRY,
+    HELD,
+    NO_LOAD,
+    Response,
+    held_by_spring,
+    no_load_at,
+)
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.drives import Drive
 from tests.estimation.loops import SWEEP, response
@@ -151,3 +158,53 @@ def test_a_mode_as_wide_as_the_window_is_none() -> None:
 def test_a_resonance_below_its_antiresonance_is_no_part_that_hangs_on_the_load() -> None:
     assert elastic_mode(response(hung)) is not None
     assert elastic_mode(response(lambda s: 1 / hung(s) / (65.0 * s) ** 2)) is None
+
+
+def test_a_load_shows_at_its_antiresonance_and_nowhere_else() -> None:
+    """With friction of any size in phase with the rate, and not where a spring to the ground is."""
+    for drag in (30.0, 300.0, 600.0):
+        found = response(lambda s, drag=drag: 1 / (1 / hung(s) + drag))
+        assert not no_load_at(found, 11.0)
+        for other in (3.0, 7.0, 30.0):
+            assert no_load_at(found, other) in NO_LOAD
+    bristles = on_spring((2 * np.pi * 10.7) ** 2)
+    for frequency in (3.0, 10.7, 30.0):
+        why = no_load_at(bristles, frequency)
+        assert why in NO_LOAD
+        assert dict(why.values) == {"frequency": frequency}
+
+
+@pytest.mark.parametrize("outside", [0.1, 1e4])
+def test_no_load_shows_outside_of_the_sweep(outside: float) -> None:
+    assert no_load_at(response(hung), outside) in NO_LOAD
+    nothing = Response(np.array([]), np.array([], dtype=complex), np.array([]), np.array([]))
+    assert no_load_at(nothing, 11.0) in NO_LOAD
+
+
+def test_noise_is_no_load() -> None:
+    """Lines of an inertia that scatter by 2 %: the largest of many differences is no evidence."""
+    random, frequency = np.random.default_rng(8), np.arange(4.0, 40.0, 0.5)
+    shown = 0
+    for _ in range(200):
+        noise = random.standard_normal((2, len(frequency)))
+        values = (1 + 0.02 * (noise[0] + 1j * noise[1])) / (2j * np.pi * frequency)
+        found = Response(frequency, values, 0.02 * np.abs(values), np.ones(len(frequency)))
+        shown += not no_load_at(found, 12.2)
+    assert shown <= 0.1 * 200
+
+
+def test_dry_friction_that_slides_is_no_load() -> None:
+    """Den Hartog: an inertia under T sin(wt + p), cos p = pi F / 2 T, and F sign(v) without a stop.
+
+    Its fundamental is j w J V = T exp(jp) - 4 F / pi. Here F / T falls along the sweep.
+    """
+    frequency = np.geomspace(5.0, 10.0, 40)
+    most = 1.0 / np.sqrt(1.0 + np.pi**2 / 4.0)  # of F over T: the axis is about to stop
+    dry = most * (1.0 - (np.arange(40) >= 20))
+    cosine = 0.5 * np.pi * dry
+    torque = cosine + 1j * np.sqrt(1.0 - cosine**2)
+    rate = (torque - 4.0 / np.pi * dry) / (2j * np.pi * frequency)
+    found = Response(frequency, rate / torque, 1e-9 * np.abs(rate), np.ones(40))
+    friction = 1 / found.values[0] - 2j * np.pi * frequency[0]
+    assert friction.imag / friction.real == pytest.approx(DRY)
+    assert no_load_at(found, 7.0) in NO_LOAD

@@ -13,7 +13,7 @@ import pytest
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.drive import TwoMass, not_determined
-from campaign.estimation.frequency_response import HELD
+from campaign.estimation.frequency_response import HELD, NO_LOAD
 from campaign.experiments.frequency_response.model.analysis import _parameters
 from campaign.experiments.frequency_response.model.axis_numbers import (
     BENT,
@@ -30,6 +30,7 @@ from campaign.protocol.bench_file import load_bench
 from campaign.reason import Reason
 from campaign.result import Result
 from tests.estimation.coverage import holds
+from tests.estimation.excited_rigs import excited_rig
 from tests.experiments.asked import asked
 from tests.experiments.laboratory import Done, analyse, execute, trials
 
@@ -229,3 +230,51 @@ def test_no_number_of_the_axis_is_told_of_what_its_bristles_hold(hung: bool, kin
             assert each.known.origin is not Origin.MEASURED
     elif kind == "rate":
         assert {each.estimate.reason.code for each in found.identified.parameters} == {HELD.code}
+
+
+def turntable(hung: bool) -> Bench:
+    return excited_rig(4, linear=False, alike=False, appendage=hung)
+
+
+@cache
+def shaken_rig(hung: bool, kind: str, times: float) -> Result:
+    """A small turntable, under torques of so many times its static friction."""
+    on = turntable(hung)
+    assert on.friction["load"].static_torque is not None
+    torque = f"{times * on.friction['load'].static_torque!r} N m"
+    lines = {"command": "torque", "torque": torque, "lowest": "1 Hz", "highest": "60 Hz"}
+    own, options = {
+        "sines": ("frequency_response", {"loop": "open", "torque": torque, "frequencies": SWEPT}),
+        "multisine": ("excitation", {**lines, "period": "2 s"}),
+        "noise": ("excitation", {**lines, "signal": "noise", "duration": "20 s"}),
+    }[kind]
+    return asked("frequency_response", execute(trials(own, on, options)))
+
+
+SWEPT = [f"{each:.3f} Hz" for each in np.geomspace(1.0, 60.0, 60)]
+OF_TWO = {"motor_inertia", "load_inertia", "stiffness", "resonance", "antiresonance"}
+SMALL = [("sines", 1.0), ("multisine", 0.5), ("noise", 4.0)]
+
+
+def measured(found: Result) -> dict[str, Estimate]:
+    both = {name: each.estimate for name, each in told(found).items()}
+    return {name: each for name, each in both.items() if each.origin is Origin.MEASURED}
+
+
+@pytest.mark.parametrize(("kind", "times"), SMALL)
+def test_a_rigid_axis_that_hardly_slides_has_no_second_inertia(kind: str, times: float) -> None:
+    found = shaken_rig(False, kind, times)
+    assert not OF_TWO & measured(found).keys()
+    assert {each.estimate.reason.code for each in told(found).values()} == {NO_LOAD.code}
+    modes = [row for table in found.tables if table.key == "modes" for row in table.rows]
+    assert not [row for row in modes if cast("Estimate", row["frequency"]).is_determined]
+
+
+@pytest.mark.parametrize(("kind", "times"), SMALL)
+def test_what_hangs_on_that_axis_is_still_told(kind: str, times: float) -> None:
+    on, found = turntable(True), measured(shaken_rig(True, kind, times))
+    assert on.axis.inertia is not None
+    assert on.appendage is not None
+    whole, part = on.axis.inertia, on.appendage
+    assert "antiresonance" in found
+    assert holds(found["resonance"], part.frequency * math.sqrt(whole / (whole - part.inertia)))

@@ -17,7 +17,7 @@ from campaign.estimation.frequency.modes import Mode, chosen_modes
 from campaign.estimation.frequency.orders import ChosenOrder, chosen_order
 from campaign.estimation.frequency.two_mass import two_mass
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import held_by_spring
+from campaign.estimation.frequency_response import Response, held_by_spring, no_load_at
 from campaign.estimation.gate import refused
 from campaign.estimation.servo import ServoCharacteristics, characteristics
 from campaign.experiments.frequency_response.model.axis_numbers import (
@@ -132,9 +132,10 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
             except ValueError as error:
                 remarks.append(f"{source.name}, {side}: {error}.")
     modes |= {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
-    for side in modes:
-        if why := held_by_spring(parts[side].response):
-            modes[side] = tuple(_refused(mode, why) for mode in modes[side])
+    for side, own in modes.items():
+        response = parts[side].response
+        held = held_by_spring(response)
+        modes[side] = tuple(_refused(mode, held or _no_load(response, mode, own)) for mode in own)
     local: dict[Side, ElasticMode] = {}
     for side, part in parts.items():
         if side not in modes and (mode := elastic_mode(part.response)) is not None:
@@ -143,7 +144,19 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
     return FrequencyFit(source, fits, modes, local, margins, tuple(remarks))
 
 
+def _no_load(response: Response, mode: Mode, modes: Sequence[Mode]) -> Reason:
+    """Why a mode is that of no load: nothing shows at its frequency, nor at its antiresonance."""
+    if not mode.frequency.is_determined:
+        return NONE
+    at = mode.frequency.value
+    zeros = [each.frequency.value for each in modes if each.is_zero]
+    below = max((zero for zero in zeros if zero < at), default=at)
+    return no_load_at(response, at) and no_load_at(response, at if mode.is_zero else below)
+
+
 def _refused(mode: Mode, why: Reason) -> Mode:
+    if not why:
+        return mode
     return replace(mode, frequency=refused(mode.frequency, why), damping=refused(mode.damping, why))
 
 
@@ -219,9 +232,25 @@ def masses(
                     result, band = replace(other, lowest=higher.lowest), higher
         if result.drive is None or result.drive.misfit:
             return replace(result, axis=result.drive)
+        if why := _rigid_on_friction(result, band):
+            return Masses(None, source, why)
         return _with_axis(result, source, [each.source for each in others], band)
     except ValueError as error:
         return Masses(None, source, NO_FIT(error=str(error)))
+
+
+def _rigid_on_friction(result: Masses, band: Band) -> Reason:
+    """Why the second inertia of a drive is none: false where it shows in a response."""
+    drive, source = result.drive, result.source
+    if drive is None or source is None or drive.rigid:
+        return NONE
+    why, parts = NONE, _parts(source, band)
+    for side, place in result.places.items():
+        at = drive.estimates["antiresonance" if place == "motor" else "resonance"]
+        why = no_load_at(parts[side].response, at.value)
+        if not why:
+            return NONE
+    return why
 
 
 def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float | None) -> Masses:
