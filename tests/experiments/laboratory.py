@@ -16,7 +16,7 @@ from campaign.protocol.expand import fields_of
 from campaign.reason import Cause
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.result import Finding, Result, Table, bare
-from campaign.trial import Trial
+from campaign.trial import Role, Trial
 
 Tree = dict[str, Any]
 MADE_UP = Cause("made up", "somebody made it up")
@@ -32,6 +32,10 @@ class Done:
     samples: Recording
     estimates: tuple[Estimate, ...] = ()
     not_kept: str = ""
+
+    @property
+    def is_completed_measurement(self) -> bool:
+        return self.ending.outcome is Outcome.COMPLETED and self.trial.role is Role.MEASUREMENT
 
     def recording(self) -> Recording:
         return self.samples

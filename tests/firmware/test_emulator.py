@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
-from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -181,8 +179,10 @@ class Pair:
         console.now = 0
         self.file = None if past == "forgetful" else folder / f"latch-{next(PLACES)}"
         if self.file is not None:
-            stop = memory.Stop(True, 3, wire.LatchCause.STOPPED, "ada") if past else memory.Stop()
-            self.file.write_text(json.dumps(asdict(stop)), encoding="utf-8")
+            cause = wire.LatchCause.STOPPED if past else wire.LatchCause.NONE
+            count, by = (3, "ada") if past else (0, "")
+            stop = memory.Stop(latched=bool(past), count=count, cause=cause, by=by, at=None)
+            self.file.write_text(stop.model_dump_json(), encoding="utf-8")
         self.python = Rehearsal(console, self.file)
 
     def send(self, kind: int, body: bytes, turn: str) -> None:
