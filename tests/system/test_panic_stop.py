@@ -397,10 +397,11 @@ def at_random(rig: Bench, how: str, chance: random.Random) -> None:
     process = rig.run()
     wait_for(lambda: rig.count("hello") >= 1, process)
     time.sleep(chance.uniform(0.0, 3.0))
-    if process.poll() is not None:
+    programs = children(process.pid)  # of its guardian; none once the run has ended
+    if not programs:
         process.communicate(timeout=PATIENCE)
         return
-    program = program_of(process)
+    (program,) = programs
     if how == "hang":
         os.kill(program, signal.SIGSTOP)
         time.sleep(chance.uniform(0.0, 0.5))
