@@ -14,12 +14,14 @@ from scipy.linalg import expm
 from scipy.signal import lfilter
 
 from campaign.estimate import Estimate
+from campaign.estimation.long_run import bandwidths
 from campaign.estimation.presliding_dynamics.driven_torque import Driven, driven_torques
 from campaign.estimation.presliding_dynamics.presliding_fit import (
     PreslidingDynamics,
     identify_presliding_dynamics,
 )
 from campaign.estimation.presliding_dynamics.record import Record
+from campaign.estimation.presliding_dynamics.uncertainty import by_scores, scores_of
 from tests.estimation.bristle_plants import Array
 from tests.estimation.coverage import holds, rejected
 
@@ -230,10 +232,10 @@ def test_intervals_hold_with_what_is_left_to_doubt_of_the_torque() -> None:
 @pytest.mark.slow
 def test_deviations_by_scores_know_what_is_left_to_doubt_of_the_torque() -> None:
     """Of white noise they are those of independent residuals and of what is known beforehand."""
-    found = identified(3, doubt=True)
-    ordinary = np.sqrt(np.diag(np.linalg.inv(found.fit.information)))
-    deviation = found.spread.deviation
-    assert deviation == pytest.approx(ordinary[: len(deviation)], rel=0.1)
+    fit = identified(3, doubt=True).fit
+    inverse, scores = np.linalg.inv(fit.information), scores_of(fit)
+    deviation = np.sqrt(np.diag(by_scores(fit, inverse, scores, bandwidths(scores)[1])))
+    assert deviation == pytest.approx(np.sqrt(np.diag(inverse))[: len(deviation)], rel=0.1)
 
 
 def test_records_that_doubt_other_things_are_not_fitted_together() -> None:

@@ -58,10 +58,7 @@ def spread_of(fit: JointFit) -> Spread:
     """
     shared = len(fit.parameters.names)
     information = fit.information
-    scores = [
-        np.einsum("cn,cnk->nk", left, slopes)
-        for left, slopes in zip(fit.residuals, fit.jacobians, strict=True)
-    ]
+    scores = scores_of(fit)
     length = np.sqrt(np.diag(information))
     if not np.all(length > 0):
         raise ValueError("a parameter changes nothing in these records")
@@ -72,26 +69,35 @@ def spread_of(fit: JointFit) -> Spread:
     count = sum(float(np.sum(c.there)) for group in fit.channels for c in group)
     variance = fit.cost / max(count - fit.parameters.size, 1.0)
     ordinary = np.sqrt(variance * np.diag(inverse))[:shared]
-    # Priors have exactly their stated uncertainty.
-    known = np.diag(fit.priors**2)
-
-    def covariance_at(terms: Sequence[Array], lags: float) -> Array:
-        whole = inverse @ (long_run(terms, lags) + known) @ inverse
-        return np.asarray(whole[:shared, :shared])
-
-    covariances = [covariance_at(scores, lags) for lags in bandwidths(scores)]
+    covariances = [by_scores(fit, inverse, scores, lags) for lags in bandwidths(scores)]
     widths = np.sqrt([np.diag(each) for each in covariances])
     # A quantized channel has the same errors in each period of the torque, without scatter.
     folded = [
         _folded(each, r.samples_per_period()) for each, r in zip(scores, fit.records, strict=True)
     ]
-    repeated = np.sqrt(np.diag(covariance_at(folded, bandwidths(folded)[1])))
+    repeated = np.sqrt(np.diag(by_scores(fit, inverse, folded, bandwidths(folded)[1])))
     # Negatively correlated residuals would result in too small deviations.
     chosen = np.maximum.reduce([safe_deviations(widths), repeated, ordinary])
     covariance = scaled_to(covariances[1], chosen)
     if len(fit.records) > 1:
         return _with_records(fit, information, covariance)
     return Spread(covariance, np.full(shared, np.inf))
+
+
+def scores_of(fit: JointFit) -> list[Array]:
+    """Scores of each record, shape (n, p)."""
+    pairs = zip(fit.residuals, fit.jacobians, strict=True)
+    return [np.einsum("cn,cnk->nk", left, slopes) for left, slopes in pairs]
+
+
+def by_scores(fit: JointFit, inverse: Array, scores: Sequence[Array], lags: float) -> Array:
+    """Covariance of the shared parameters by scores with this bandwidth, shape (k, k).
+
+    `inverse`: of the information. Priors have exactly their stated uncertainty.
+    """
+    whole = inverse @ (long_run(scores, lags) + np.diag(fit.priors**2)) @ inverse
+    shared = len(fit.parameters.names)
+    return np.asarray(whole[:shared, :shared])
 
 
 def _folded(scores: Array, period: int | None) -> Array:
