@@ -37,6 +37,8 @@ CURES = {
     "slow": "record more motion at low speeds",
     "instruments": "reduce the noise of the measured motion, or accelerate more",
     "loop": "record the wanted motion as well (channel `reference`)",
+    "presliding": "excite with more force, until the axis slides",
+    "form of the curve": "friction follows another law; look at what is left over",
     "delay": "record faster, with sharper reversals, or with a reference signal on both channels",
 }
 """Advice that makes a systematic part smaller, by its source."""

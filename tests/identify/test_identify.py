@@ -17,13 +17,15 @@ from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.gate import TOO_WIDE
+from campaign.estimation.velocity_map import FORM
 from campaign.experiments.analysis import suitable
+from campaign.experiments.any_motion.inverse_fit import PRESLIDING
 from campaign.experiments.any_motion.inverse_result import NO_SLOPE
 from campaign.experiments.interface import Model
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import Identification, _compared, _section, identify, widest
 from campaign.identify.material import choose
-from campaign.identify.page import _advice, next_measurement, write_identification
+from campaign.identify.page import CURES, _advice, next_measurement, write_identification
 from campaign.identify.tables import parameter_unit, parameter_words, parameters_table
 from campaign.parameter import Parameter, Unseen
 from campaign.physics.bench import Bench
@@ -100,6 +102,11 @@ def test_what_to_measure_next_is_told_of_the_widest_interval(found: Identificati
     assert told in next_measurement(found)
     nothing = replace(found, sections=())
     assert next_measurement(nothing) == ""
+
+
+@pytest.mark.parametrize("source", [PRESLIDING, FORM])
+def test_what_a_model_lacks_is_not_to_be_known_better(source: str) -> None:
+    assert source in CURES
 
 
 def test_what_is_open_for_another_reason_is_not_measured_next() -> None:
