@@ -15,10 +15,10 @@ never filled with NaN, which means lost samples only. `ChannelInfo.own_rate` is 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import lru_cache
 
 from campaign.axis_kind import AxisKind as AxisKind  # known by this name to backends
 from campaign.axis_kind import Sides, axis_unit, in_axis_terms
@@ -273,6 +273,7 @@ UNITS = {
 """(SI unit, display unit) by kind of axis and quantity."""
 
 
+@lru_cache(maxsize=512)
 def info(
     name: str, mode: str = "", *, axis: AxisKind = AxisKind.ROTARY, own_rate: float | None = None
 ) -> ChannelInfo:
@@ -302,7 +303,7 @@ def wrong_names(names: Sequence[object]) -> str:
     for name in names:
         if not isinstance(name, str) or not _NAME.fullmatch(name) or name == "time":
             return f"{name!r} cannot name a channel: letters, digits and '_', not 'time'"
-    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    twice = next((name for name in names if names.count(name) > 1), None)
     return f"two channels are called {twice!r}" if twice else ""
 
 

@@ -15,7 +15,9 @@ from campaign.backends.step_check import StepCheck
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import PURPOSES, CompleteBench, IncompleteBenchError, complete
+from campaign.physics.rows import BASE_RATE, DRIVE
 from campaign.physics.truth import simulated
+from campaign.physics.variation import is_drawn
 from campaign.recording import Array, Ending, Recorder, SafeState
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Tree, Trial, tree_text
@@ -67,6 +69,7 @@ class SimBackend:
         self._options = options
         self._benches: dict[str, CompleteBench] = {}
         self._truths: dict[str, Tree] = {}
+        self._lanes: dict[Hashable, Lane] = {}
         self._simulated: dict[tuple[str, str], CompleteBench] = {}
         self._accepted: set[Hashable] = set()
         self._known: dict[str, _Known] = {}
@@ -171,9 +174,10 @@ class SimBackend:
         self, trials: Sequence[Trial], recorders: Sequence[Recorder], stops: Sequence[StopFlag]
     ) -> Iterator[tuple[int, Ending]]:
         """Execute trials of one structure in parallel lanes."""
+        from campaign.physics.lanes import sampled
         from campaign.physics.simulate import samples_at_a_time, simulate_together
 
-        lanes = [self._lane(trial) for trial in trials]
+        lanes, tasks = [self._lane(trial) for trial in trials], [trial.task for trial in trials]
         halves: Iterable[tuple[Any, Sequence[Array | None]]] = repeat((None, [None] * len(lanes)))
         stretch = None
         if self._options.check_step:
@@ -191,9 +195,10 @@ class SimBackend:
         }
         whole = self.timing.each(Work.ENGINE, simulate_together(lanes, stretch))
         for (times, outs), (_, outs_of_half) in zip(whole, halves, strict=False):
+            commands, base_rates = (sampled(tasks, which, times) for which in (DRIVE, BASE_RATE))
             for place, begun in tuple(going.items()):
-                out = outs[place]
-                ending = begun.take(times[: out.shape[1]], out, outs_of_half[place])
+                inputs = commands[place], base_rates[place]
+                ending = begun.take(times, inputs, outs[place], outs_of_half[place])
                 if ending is not None:
                     del going[place]
                     yield place, ending
@@ -231,9 +236,17 @@ class SimBackend:
 
         longest_step = longest_step or self._options.longest_step
         with self.timing.span(Work.SETTING_UP):
+            kind = trial.apart_from_seed, longest_step
+            if (lane := self._lanes.get(kind)) is not None:
+                return lane.with_seed(trial.seed)
             stated = self._bench(trial)
             bench = self._simulated_instead(trial, stated) if trial.truth else stated
-            return Lane.of(bench, trial.task, trial.seed, longest_step, stated)
+            lane = Lane.of(bench, trial.task, trial.seed, longest_step, stated)
+            if not is_drawn(bench):
+                if len(self._lanes) >= MOST_BENCHES:
+                    self._lanes.clear()
+                self._lanes[kind] = lane
+            return lane
 
     def _simulated_instead(self, trial: Trial, stated: CompleteBench) -> CompleteBench:
         """Bench with the plant of the truth and the software of the stated bench."""

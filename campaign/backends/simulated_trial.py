@@ -25,7 +25,6 @@ from campaign.channels import (
     axis_of,
     info,
 )
-from campaign.physics.base_motion import base_rate
 from campaign.physics.complete import CompleteBench
 from campaign.physics.limit_watch import LimitWatch
 from campaign.recording import Array, ChannelInfo, Ending, Event, Outcome, Recorder
@@ -102,18 +101,25 @@ class SimulatedTrial:
         self._watch = LimitWatch(bench.limits, task.sample_rate, names, bench.sides)
         recorder.start(announced(names, task.mode, bench.sides))
 
-    def take(self, time: Array, out: Array, half: Array | None = None) -> Ending | None:
-        """Record the next outputs (8, n), rows as `OUTPUTS`, at `time` (n,); the ending, or None.
+    def take(
+        self, time: Array, inputs: tuple[Array, Array], out: Array, half: Array | None = None
+    ) -> Ending | None:
+        """Record the next outputs (8, n), rows as `OUTPUTS`; the ending, or None.
 
-        `half`: the same outputs at half the step, for a step check.
+        Args:
+            time, inputs: of the samples (s), and command and rate of the hull at these times; n
+                samples or more.
+            half: the same outputs at half the step, for a step check.
         """
-        ending = self._take(time, out, half)
+        ending = self._take(time[: out.shape[1]], inputs, out, half)
         if ending is None or self._check is None:
             return ending
         return replace(ending, telemetry=self._check.telemetry())
 
-    def _take(self, time: Array, out: Array, half: Array | None) -> Ending | None:
-        block = self._block(time, out)
+    def _take(
+        self, time: Array, inputs: tuple[Array, Array], out: Array, half: Array | None
+    ) -> Ending | None:
+        block = self._block(inputs, out)
         # From the gyro if available: a differentiated angle is too coarse for slow motion.
         rate = block[2] if self._bench.rate_is_of_encoder else block[2] - block[1]
         reached = _first_beyond(rate, self._task.stop_rate)
@@ -135,13 +141,12 @@ class SimulatedTrial:
             return Ending(Outcome.INTERRUPTED, "stopped by the operator")
         return None if self._left > 0 else Ending(Outcome.COMPLETED)
 
-    def _block(self, time: Array, out: Array) -> Array:
+    def _block(self, inputs: tuple[Array, Array], out: Array) -> Array:
         """The recorded channels, shape (11, n); fewer rows if the truth is not recorded."""
         bench, task = self._bench, self._task
-        block = np.empty((len(CHANNELS), len(time)))
+        block = np.empty((len(CHANNELS), out.shape[1]))
         gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
-        block[0] = task.command.sample(time)
-        block[1] = base_rate(task.base_acceleration, time)
+        block[0], block[1] = (samples[: out.shape[1]] for samples in inputs)
         block[2], block[3], block[4], block[5] = gyro, relative, angle, current
         if task.mode == "spring":  # the spring pulls the load instead of the motor
             block[6] = task.spring_stiffness * (block[0] - angle)

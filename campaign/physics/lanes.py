@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -107,6 +108,12 @@ class Lane:
             ),
         )
 
+    def with_seed(self, seed: int) -> Lane:
+        """The same trial with another seed, on a bench whose friction no seed changes."""
+        lane = copy(self)  # with what was computed at first use
+        vars(lane)["seed"] = seed
+        return lane
+
     @cached_property
     def discrete(self) -> tuple[Array, Array, Array]:
         """The discretised loop F, G, H; see `loop.discretise`.
@@ -183,7 +190,7 @@ class Lanes:
         inputs = self.trials[0].inputs
         signals = zeros(len(inputs), len(at), self.width)
         for row, which in enumerate(inputs):
-            own = _sampled([trial.task for trial in self.trials], which, at)
+            own = sampled([trial.task for trial in self.trials], which, at)
             signals[row] = own[0][:, None]
             for k, samples in enumerate(own):
                 if samples is not own[0]:
@@ -258,8 +265,8 @@ def _acting(task: Task, which: int) -> Signal:
     ]
 
 
-def _sampled(tasks: Sequence[Task], which: int, at: Array) -> list[Array]:
-    """Samples of an input for each task; a shared signal is sampled once."""
+def sampled(tasks: Sequence[Task], which: int, at: Array) -> list[Array]:
+    """Samples of an input at times `at` (s) for each task; a shared signal is sampled once."""
     known: list[tuple[Signal, Array]] = []
     inputs = []
     for task in tasks:
@@ -332,7 +339,9 @@ def _torque_columns(lane: Lane, which: int, rows: int) -> Array:
 
 def _filled_up(array: Array, shape: tuple[int, int]) -> Array:
     """Pad an array with zeros to a shape."""
-    return np.pad(array, [(0, most - have) for most, have in zip(shape, array.shape, strict=True)])
+    padded = np.zeros(shape)
+    padded[: array.shape[0], : array.shape[1]] = array
+    return padded
 
 
 def _sigmas(lane: Lane) -> Array:

@@ -24,7 +24,7 @@ from campaign.trial import Task
 
 STRETCH_STEPS = 20_000
 """Steps of a trial between two checks of limits and stops."""
-BLOCK_STEPS, BLOCK_SAMPLES = 32_000, 8_000
+BLOCK_STEPS, BLOCK_SAMPLES = 128_000, 16_000
 """The same for a block; more samples exceed the processor's cache."""
 
 

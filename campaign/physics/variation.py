@@ -40,6 +40,11 @@ def as_it_is(bench: _Bench, seed: int) -> _Bench:
     return _scaled(bench, draws)
 
 
+def is_drawn(bench: Bench) -> bool:
+    """Whether the friction of `bench` depends on the seed of a trial."""
+    return bench.variation is not None and len(bench.variation.trials) > 0
+
+
 def of_its_day(bench: _Bench) -> _Bench:
     """`bench` with the friction of its day and its preload, the center of its trials' scatter."""
     kept = _OF_ITS_DAY.get(id(bench))  # the cache keeps the bench, so its id stays unique

@@ -31,6 +31,7 @@ from campaign.execution.trial_metrics import LIMIT, TrialMeasurement, author
 from campaign.experiments import experiments
 from campaign.experiments.friction_lag import cycle_windows
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.plugins import Kinds
 from campaign.report.build import render
 from campaign.report.content.document import ANEW
 from campaign.resources import templates_folder
@@ -220,7 +221,11 @@ def test_what_cannot_be_measured_costs_no_trial(
     assert "second line" not in reason
 
 
-def test_measuring_that_hangs_costs_no_trial(tmp_path: Path) -> None:
+def test_a_plug_in_that_hangs_costs_no_trial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plug_in = PlugIn("campaign.experiments", "top_rate", "tops", "1.0", "tops:IT", ("tops",))
+    monkeypatch.setattr(Kinds, "plug_in", lambda kinds, name: plug_in)
     released = threading.Event()
 
     def hangs(data: TrialData) -> Sequence[Estimate]:

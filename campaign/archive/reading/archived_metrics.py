@@ -7,10 +7,9 @@ The line of the journal refers to the record of the trial by its digest.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 from campaign.archive.layout.journal import Entry, TrialFinished, TrialMeasured
-from campaign.archive.layout.record import plain
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.estimate import Estimate
 
@@ -43,7 +42,10 @@ def trial_measured(at: str, finished: TrialFinished, found: ArchivedMetrics) -> 
             "attempt": finished.attempt,
             "record": finished.record,
             "by": found.by,
-            "estimates": [plain(asdict(estimate)) for estimate in found.estimates],
+            "estimates": [
+                {**vars(each), "systematic": [vars(part) for part in each.systematic]}
+                for each in found.estimates
+            ],
         }
     )
 
