@@ -115,9 +115,9 @@ def no_load_at(response: Response, frequency: float) -> Reason:
     that slides adds up to `DRY` of its damping.
     """
     told = response.told
-    rate, resistance = 2.0 * np.pi * told.frequency, 1.0 / told.values
+    rate, square = 2.0 * np.pi * told.frequency, np.maximum(np.abs(told.values) ** 2, 1e-300)
+    resistance, error = told.values.conj() / square, SURELY * told.error / square / rate
     inertia, damping = resistance.imag / rate, np.maximum(resistance.real, 0.0) / rate
-    error = SURELY * told.error / np.abs(told.values) ** 2 / rate
     below, above = told.frequency < frequency, told.frequency > frequency
     if not below.any() or not above.any():
         return NO_LOAD(frequency=frequency)

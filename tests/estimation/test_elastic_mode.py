@@ -174,6 +174,14 @@ def test_a_load_shows_at_its_antiresonance_and_nowhere_else() -> None:
         assert dict(why.values) == {"frequency": frequency}
 
 
+def test_a_load_shows_beside_an_antiresonance_without_any_response() -> None:
+    found = response(hung)
+    values = found.values.copy()
+    values[np.argmin(np.abs(found.frequency - 11.0))] = 0.0
+    with np.errstate(all="raise"):
+        assert not no_load_at(replace(found, values=values), 11.0)
+
+
 @pytest.mark.parametrize("outside", [0.1, 1e4])
 def test_no_load_shows_outside_of_the_sweep(outside: float) -> None:
     assert no_load_at(response(hung), outside) in NO_LOAD
