@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -86,6 +87,11 @@ class Task(Options):
     sample_rate: float = Field(gt=0)
     start_angle: float = 0.0
     stop_rate: float | None = Field(default=None, gt=0)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of the whole duration; a last period that is cut short has none."""
+        return max(1, math.floor(self.duration * self.sample_rate + 1e-6))
 
 
 class Trial(Options):

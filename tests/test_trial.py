@@ -52,3 +52,21 @@ def test_what_plug_ins_imported_from_here_is_what_came_back():
     assert nouns > {"Recording", "Channel", "Ending", "Outcome", "MemoryRecorder", "lost_samples"}
     for name in (nouns - {"record"}) | {"Array"}:  # `record` came later
         assert getattr(asked, name) is getattr(recording, name)
+
+
+@pytest.mark.parametrize(
+    ("duration", "rate", "samples"),
+    [
+        (0.29, 100.0, 29),
+        (0.7, 10.0, 7),
+        (1.999, 1.0, 1),
+        (2.5, 1.0, 2),
+        (0.1, 1.0, 1),
+        (1e4, 1e4, 10**8),
+    ],
+)
+def test_samples_are_the_whole_periods_of_the_duration(
+    duration: float, rate: float, samples: int
+) -> None:
+    task = Task(mode="torque", duration=duration, window=(0.0, duration), sample_rate=rate)
+    assert task.samples == samples

@@ -31,7 +31,7 @@ class Targets:
 
 def targets_of(task: Task) -> Targets:
     """Ends of the ramps if all have one slope (the drive generates them); else each sample."""
-    count = max(1, round(task.duration * task.sample_rate))
+    count = task.samples
     time = np.arange(count + 1) / task.sample_rate
     command = task.command
     if isinstance(command, Polyline) and (slope := _one_slope(command.times, command.values)):

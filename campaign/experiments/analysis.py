@@ -189,9 +189,8 @@ def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
     if data.trial.kind != experiment.name:
         return None
     most, task = experiment.most_samples, data.trial.task
-    samples = task.duration * task.sample_rate
-    if most is not None and samples > most:
-        return doubted(data.trial, TOO_LONG(samples=samples, most=most))
+    if most is not None and task.samples > most:
+        return doubted(data.trial, TOO_LONG(samples=task.samples, most=most))
     return doubt(data)
 
 

@@ -45,7 +45,7 @@ class Along:
 
     def __init__(self, task: Task) -> None:
         """task: prescribed rate in rad/s (or m/s); a step is one sample at most."""
-        self._count = round(task.duration * task.sample_rate)
+        self._count = task.samples
         self._met = FrictionAlong(_bare_bench(), task, 1.0 / task.sample_rate)
 
     @classmethod

@@ -57,7 +57,7 @@ def make_grid(bench: CompleteBench, task: Task, longest_step: float | None = Non
             fastest = signal.frequency if isinstance(signal, Sine) else max(signal.frequencies)
             if 1.0 / (STEPS_PER_CYCLE * fastest) < longest_step:
                 longest_step, because = 1.0 / (STEPS_PER_CYCLE * fastest), f"{fastest:g} Hz"
-    samples = max(1, math.floor(task.duration * task.sample_rate + 1e-9))
+    samples = task.samples
     if control_rate is None or continuous:
         every = max(1, math.ceil(1.0 / (task.sample_rate * longest_step) - 1e-9))
         if every == 1 and task.sample_rate * step_choice.LONGEST > 1.0:

@@ -330,15 +330,10 @@ def place_hash(*place: Any) -> int:
     return int.from_bytes(digest[:8], "big") >> 1
 
 
-def samples_of(task: Task) -> int:
-    """Samples per channel."""
-    return max(1, int(task.duration * task.sample_rate))
-
-
 def check_recording(task: Task) -> None:
     """Raise ValueError for a recording so long that it must be an error of units."""
-    if samples_of(task) > LARGEST_RECORDING:
+    if task.samples > LARGEST_RECORDING:
         raise ValueError(
-            f"a trial of {samples_of(task):.3g} samples; at most {LARGEST_RECORDING:.3g} are "
+            f"a trial of {task.samples:.3g} samples; at most {LARGEST_RECORDING:.3g} are "
             "allowed: lower sample_rate or the duration"
         )

@@ -22,7 +22,6 @@ from campaign.protocol.expand import (
     ExpandedTest,
     expand,
     memory_problem,
-    samples_of,
     seed_of,
     size_problem,
 )
@@ -144,7 +143,7 @@ class Plan:
     @property
     def samples(self) -> int:
         """Samples of all trials, per channel."""
-        return sum(samples_of(trial.task) for trial in self.trials)
+        return sum(trial.task.samples for trial in self.trials)
 
     @property
     def size(self) -> int:
@@ -252,7 +251,7 @@ def _too_many(
 
 
 def _size(trial: Trial) -> int:
-    samples = samples_of(trial.task)
+    samples = trial.task.samples
     preview = 2 * 8 * PREVIEW if samples > PREVIEW else 0
     return samples * BYTES + preview + STRUCTURE + len(trial.model_dump_json())
 

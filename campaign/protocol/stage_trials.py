@@ -10,7 +10,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.limits import margins
 from campaign.physics.plan_loops import loops_used
 from campaign.physics.resolution import resolution_margins
-from campaign.protocol.expand import check_recording, fields_of, place_hash, samples_of
+from campaign.protocol.expand import check_recording, fields_of, place_hash
 from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.points import first_line
 from campaign.protocol.schema import ExperimentKind
@@ -94,7 +94,7 @@ def _check_size(most: Most, asked: Sequence[TrialRequest]) -> None:
         raise TooMuchError(
             f"its trials take {duration:.4g} s, and it said {most.duration:.4g} s at most"
         )
-    samples = sum(samples_of(request.task) for request in asked)
+    samples = sum(request.task.samples for request in asked)
     if samples > most.samples:
         raise TooMuchError(
             f"its trials record {samples} samples, and it said {most.samples} at most"

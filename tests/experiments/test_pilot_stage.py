@@ -35,7 +35,6 @@ from campaign.physics.bench import Bench
 from campaign.physics.limits import margins
 from campaign.physics.true_values import stribeck_parameters
 from campaign.physics.truth import digest, plant_of
-from campaign.protocol.expand import samples_of
 from campaign.protocol.stage_trials import ROUNDING
 from campaign.recording import Recording
 from campaign.result import Result
@@ -334,7 +333,7 @@ def test_it_keeps_to_what_it_announced_whichever_speeds_are_chosen() -> None:
         tasks = [each.task for each in run_requests(run, options, Rig(bench), 0)] * count
         assert len(tasks) == most.trials
         assert sum(task.duration for task in tasks) <= most.duration * (1.0 + ROUNDING)
-        assert sum(samples_of(task) for task in tasks) <= most.samples
+        assert sum(task.samples for task in tasks) <= most.samples
 
 
 def test_nothing_follows_a_plain_map() -> None:

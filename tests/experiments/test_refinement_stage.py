@@ -18,7 +18,6 @@ from campaign.experiments.frequency_response.experiment import (
 )
 from campaign.experiments.interface import TestData, options_of
 from campaign.physics.bench import Bench
-from campaign.protocol.expand import samples_of
 from campaign.trial import Trial
 from tests.experiments.laboratory import Done, analyse, execute, failed, finding, trials
 from tests.experiments.test_frequency_response import current_to_rate, frictionless, sampled
@@ -103,7 +102,7 @@ def test_it_keeps_to_what_it_announced_wherever_the_crossings_are(rig: Bench) ->
         asked[:2] = [_request(options, rig, frequency).task for frequency in (lowest, highest)]
         assert len(asked) == most.trials
         assert sum(task.duration for task in asked) <= most.duration
-        assert sum(samples_of(task) for task in asked) <= most.samples
+        assert sum(task.samples for task in asked) <= most.samples
 
 
 def test_the_shipped_protocols_refine_nothing() -> None:

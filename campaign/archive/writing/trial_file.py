@@ -214,7 +214,7 @@ class TrialFile:
         """Buffer samples until the trial ends; memory for the planned duration is allocated."""
         start, self._count = self._count, self._count + len(time)
         if self._count > self._held.shape[1]:
-            planned = math.ceil(self._trial.task.duration * self._trial.task.sample_rate) + 1
+            planned = self._trial.task.samples + 1
             room = np.empty((1 + len(block), max(planned, 2 * start, self._count)))
             room[:, :start] = self._held[:, :start]
             self._held = room

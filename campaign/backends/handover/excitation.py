@@ -15,7 +15,7 @@ from campaign.importing.derived_channels import RigFacts
 from campaign.physics.base_motion import base_rate
 from campaign.physics.bench import Bench
 from campaign.recording import Array
-from campaign.trial import Task, Trial
+from campaign.trial import Trial
 from campaign.units import convert
 
 
@@ -31,11 +31,6 @@ class Series:
     def heading(self) -> str:
         """Heading in the CSV file."""
         return f"{self.name} ({self.unit})"
-
-
-def samples_of(task: Task) -> int:
-    """Number of samples of a trial with its full duration."""
-    return max(2, round(task.duration * task.sample_rate))
 
 
 def shown(trial: Trial, channel: str, value: float) -> str:
@@ -59,7 +54,7 @@ def facts_of(trial: Trial) -> RigFacts:
 def excitation(trial: Trial) -> Sequence[Series]:
     """Time, command and, for a moving hull, its acceleration and rate."""
     task, axis = trial.task, sides_in(trial.bench).load
-    time = np.arange(samples_of(task)) / task.sample_rate
+    time = np.arange(task.samples) / task.sample_rate
     unit = info(COMMAND, task.mode, axis=axis).unit
     series = [Series("time", "s", time), Series(COMMAND, unit, task.command.sample(time))]
     if task.base_acceleration.shape != "zero":

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.axis_kind import sides_in
-from campaign.backends.handover.excitation import facts_of, samples_of
+from campaign.backends.handover.excitation import facts_of
 from campaign.channels import COMMAND, GYRO_RATE, RELATIVE_RATE, info, missing
 from campaign.importing.derived_channels import AT_REST
 from campaign.importing.description import RecordingDescription
@@ -95,7 +95,7 @@ def read_returned(
             raise OtherRateError(_other_rate(rate, task.sample_rate))
         channels = tuple(_announced(trial, made.info) for made in described.channels)
         _check_channels(trial, described)
-        enough = math.ceil((samples_of(task) - 1) * ratio) + 2
+        enough = math.ceil((task.samples - 1) * ratio) + 2
         read = described.model_copy(update={"samples": min(described.samples, enough)})
         blocks = list(RecordingReader(read, opened).blocks())
     samples = np.concatenate([block for _, block, _ in blocks], axis=1)
@@ -104,7 +104,7 @@ def read_returned(
     over = described.samples - enough
     if over > 0:
         remarks.append(f"what it has after the trial, {over / rate:.4g} s, is left out")
-    samples, lost = _on_the_grid(samples, lost, ratio, samples_of(task), remarks)
+    samples, lost = _on_the_grid(samples, lost, ratio, task.samples, remarks)
     time = np.arange(samples.shape[1]) / task.sample_rate
     return ReturnedRecording(
         channels, time, samples, lost, rate, described.samples / rate, tuple(remarks)

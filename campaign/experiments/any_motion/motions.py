@@ -84,7 +84,7 @@ def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
         names = each.channel_names()
         if not names & {*FORCES} or not names & {RELATIVE_ANGLE, RELATIVE_RATE}:
             continue
-        samples += round(each.trial.task.duration * each.trial.task.sample_rate)
+        samples += each.trial.task.samples
         if usable_trials and samples > MOST_SAMPLES:
             break
         usable_trials.append(each)

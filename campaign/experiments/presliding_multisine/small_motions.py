@@ -83,7 +83,7 @@ def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
         if why := _not_even(each):
             whys.append(why)
             continue
-        samples += round(each.trial.task.duration * each.trial.task.sample_rate)
+        samples += each.trial.task.samples
         if samples > MOST_SAMPLES:
             whys.append(f"{each.trial.label}: more than {MOST_SAMPLES} samples; take a part of it")
             break
