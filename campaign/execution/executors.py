@@ -209,7 +209,8 @@ class BatchWorker:
         self._setup, self._stopped = setup, stopped
         self._stopwatch = Stopwatch() if setup.is_timed else None
         self._timing = timing = self._stopwatch or UNTIMED
-        self._measure = TrialMeasurement(experiments(), timing) if setup.is_measured else None
+        measure = TrialMeasurement(experiments(), timing, only_plug_ins=True)
+        self._measure = measure if setup.is_measured else None
         if isinstance(setup.backend, SupportsTiming):
             setup.backend.timing = timing
 

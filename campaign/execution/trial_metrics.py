@@ -31,7 +31,7 @@ from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Role
 
 LIMIT = 60.0
-"""s; time limit of a plug-in per recording: the bench and later stages wait for it."""
+"""s; time limit per recording: the bench and later stages wait for it."""
 
 
 @dataclass(frozen=True)
@@ -41,21 +41,22 @@ class TrialMeasurement:
     Any thread may use it.
 
     Attributes:
-        limit: time limit of a plug-in's computation (s); a longer one is abandoned, without metrics
-            in the archive. The program's own kinds have none: a thread for each trial costs as much
-            as its metrics.
+        limit: time limit (s); a longer computation is abandoned, without metrics in the archive.
+        only_plug_ins: whether the limit applies to plug-ins only, as no bench waits. A thread for
+            each trial costs as much as its metrics.
     """
 
     experiments: Kinds[Experiment]
     timing: Timing = UNTIMED
     limit: float = LIMIT
+    only_plug_ins: bool = False
     _authors: dict[str, str] = field(default_factory=dict)  # by kind
 
     def __call__(self, data: ArchivedTrial) -> ArchivedMetrics:
         if data.ending.outcome is not Outcome.COMPLETED or data.trial.role is not Role.MEASUREMENT:
             return ArchivedMetrics()
         with self.timing.span(Work.MEASURING):
-            if self.experiments.plug_in(data.trial.kind) is None:
+            if self.only_plug_ins and self.experiments.plug_in(data.trial.kind) is None:
                 return self._found(data)
             return self._in_time(data)
 

@@ -221,11 +221,7 @@ def test_what_cannot_be_measured_costs_no_trial(
     assert "second line" not in reason
 
 
-def test_a_plug_in_that_hangs_costs_no_trial(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plug_in = PlugIn("campaign.experiments", "top_rate", "tops", "1.0", "tops:IT", ("tops",))
-    monkeypatch.setattr(Kinds, "plug_in", lambda kinds, name: plug_in)
+def test_measuring_that_hangs_costs_no_trial(tmp_path: Path) -> None:
     released = threading.Event()
 
     def hangs(data: TrialData) -> Sequence[Estimate]:
@@ -238,6 +234,27 @@ def test_a_plug_in_that_hangs_costs_no_trial(
     finally:
         released.set()
     assert why_not_measured(reader) == "measuring did not end within 0.2 s"
+
+
+@pytest.mark.parametrize("plugged", [False, True])
+def test_a_worker_needs_a_thread_for_plug_ins_only(
+    plugged: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = []
+
+    def measure(data: TrialData) -> Sequence[Estimate]:
+        threads.append(threading.current_thread().name)
+        return []
+
+    plug_in = PlugIn("campaign.experiments", "top_rate", "tops", "1.0", "tops:IT", ("tops",))
+    if plugged:
+        monkeypatch.setattr(Kinds, "plug_in", lambda kinds, name: plug_in)
+    (done,) = execute(trials("stick_slip", bench(), SLIPS))
+    trial = done.trial.model_copy(update={"kind": "top_rate"})
+    (recorded,) = open_run(archived(tmp_path, [(trial, done.samples)])).trials
+    with experiments().including(top_rate(measure)):
+        TrialMeasurement(experiments(), only_plug_ins=True)(recorded)
+    assert threads == ["measuring" if plugged else threading.current_thread().name]
 
 
 def test_a_recording_is_archived_before_it_is_measured(tmp_path: Path) -> None:
