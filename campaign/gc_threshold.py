@@ -24,4 +24,6 @@ def paused_collection() -> Iterator[None]:
         yield
     finally:
         if enabled:
+            gc.freeze()  # makes them old objects, without the look at each of a collection
+            gc.unfreeze()
             gc.enable()

@@ -115,6 +115,17 @@ def sha256_of(
     return digest.hexdigest()
 
 
+def lines_of(path: Path, offset: int, size: int) -> Iterator[bytes]:
+    """Lines of `size` bytes of a file, without their ends, in constant memory."""
+    with path.open("rb", buffering=_BLOCK) as file:
+        file.seek(offset)
+        for line in file:
+            size -= len(line)
+            if size < 0:
+                return
+            yield line[:-1]
+
+
 def sha256_of_part(path: Path, offset: int, size: int) -> str:
     """SHA-256 of `size` bytes of a file, in constant memory."""
     digest = hashlib.sha256()

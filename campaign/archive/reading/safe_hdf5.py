@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
 
-from campaign.archive.layout.files import sha256_of, sha256_of_part, why
+from campaign.archive.layout.files import lines_of, sha256_of, sha256_of_part, why
 from campaign.archive.layout.storage import CHECKSUM, SAMPLE
 from campaign.archive.reading.global_heap_check import heaps_are_sound
 from campaign.errors import ArchiveError
@@ -193,6 +193,13 @@ def _raw_text(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, bytes]:
     with path.open("rb") as file:  # without HDF5's copy: an index may be large
         file.seek(offset)
         return dataset, file.read(size).rstrip(b"\0")
+
+
+def line_digests_at(parent: h5py.Group, name: str) -> Iterator[str]:
+    """SHA-256 of each line of a text, without its end; the text may be damaged."""
+    place = _place_in_file(_text_id(parent, name))
+    lines = _raw_text(parent, name)[1].split(b"\n")[:-1] if place is None else lines_of(*place)
+    return (hashlib.sha256(line).hexdigest() for line in lines)
 
 
 def _place_in_file(dataset: h5d.DatasetID) -> tuple[Path, int, int] | None:

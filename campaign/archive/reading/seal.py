@@ -6,6 +6,7 @@ the whole run. A signature signs this digest.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -96,6 +97,15 @@ class SealedTexts:
         """A text of `/run` in UTF-8 without a check; it may be damaged. Raises ArchiveError."""
         with safe_hdf5.guarded(self._path, f"/run/{place}"):
             return safe_hdf5.unchecked_raw_text_at(*self._parent(place))
+
+    def line_digests(self, place: str) -> list[str]:
+        """SHA-256 of each line of a text of `/run`; empty if it cannot be read."""
+        with (
+            contextlib.suppress(ArchiveError),
+            safe_hdf5.guarded(self._path, f"/run/{place}"),
+        ):
+            return list(safe_hdf5.line_digests_at(*self._parent(place)))
+        return []
 
     def integer(self, place: str) -> int:
         """An integer of `/run`. Raises ArchiveError if it is damaged."""

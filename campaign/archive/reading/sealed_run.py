@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -201,8 +201,6 @@ class _Trials:
     Attributes:
         story: the journal.
         groups: names of the top-level members of the file.
-        index: the index.
-        lines: places of its lines, by digest.
         whole: whether the index is unchanged since sealing; it can then replace journal lines.
         in_step: whether all texts are as sealed, and the index has exactly the records of the
             journal, in the order of trials.
@@ -213,8 +211,6 @@ class _Trials:
     path: Path
     story: Lines
     groups: frozenset[str]
-    index: bytes
-    lines: Mapping[str, slice]
     whole: bool
     in_step: bool
     trees: Trees
@@ -224,20 +220,30 @@ class _Trials:
     def read(
         cls, path: Path, texts: SealedTexts, story: Lines, file: h5py.File, damaged: DamageList
     ) -> _Trials:
-        index, trees = (_unchecked(texts, place) for place in ("index/data", "trees/data"))
+        trees = _unchecked(texts, "trees/data")
         _is_as_sealed(texts, "trees/data", damaged)
-        places = list(line_places(index))
-        digests = [sha256(memoryview(index)[place]).hexdigest() for place in places]
         recorded = [each.record for each in entry_names(story.attempts).values()]
         # The records of a sealed journal, in its order, are the whole index: no second check.
-        in_step = digests == recorded and story.whole and not damaged.found
+        in_step = texts.line_digests("index/data") == recorded
+        in_step = in_step and story.whole and not damaged.found
         whole = in_step or _is_as_sealed(texts, "index/data", damaged)
-        lines = dict(zip(digests, places, strict=True))
         not_kept: dict[str, str] = {}
         with damaged.noting(), safe_hdf5.guarded(path, "/run/not_kept"):
             not_kept = read_not_kept(texts)
         groups = frozenset(safe_hdf5.names(file))
-        return cls(path, story, groups, index, lines, whole, in_step, _good_trees(trees), not_kept)
+        return cls(path, story, groups, whole, in_step, _good_trees(trees), not_kept)
+
+    @cached_property
+    def index(self) -> bytes:
+        """The index, read at first use; it may be damaged."""
+        with safe_hdf5.open_file(self.path) as file, safe_hdf5.guarded(self.path, "/run"):
+            return _unchecked(SealedTexts(self.path, file, DamageList(self.path)), "index/data")
+
+    @cached_property
+    def lines(self) -> dict[str, slice]:
+        """Places of the lines of the index, by digest."""
+        index = memoryview(self.index)
+        return {sha256(index[place]).hexdigest(): place for place in line_places(self.index)}
 
     def archived(
         self, plan: Sequence[PlannedTrial], damaged: DamageList
@@ -248,27 +254,26 @@ class _Trials:
         parsed once, which detects its damage, and is not kept.
         """
         outlines: list[Outline] = []
-        kept: dict[int, TrialFinished] = {}
         earlier: dict[int, list[ArchivedTrial]] = {}
         attempts = self._attempts()
-        unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
-        if unknown:
-            damaged.add("/run/index", f"has {unknown} records that are not in the journal")
+        if self.whole and not self.in_step:
+            unknown = len(self.lines.keys() - {each.record for each in attempts})
+            if unknown:
+                damaged.add("/run/index", f"has {unknown} records that are not in the journal")
         names = entry_names(attempts)
+        kept = {finished.trial: finished for finished in names.values()}  # the last attempts
         planned = {each.number: each for each in plan} if self.in_step else {}
         for entry, finished in names.items():
-            last = entry == entry_name(finished.trial)
+            last = finished is kept[finished.trial]
             present = entry in self.groups or entry in self.not_kept
             if last and present and (of := planned.get(finished.trial)):
                 ending = finished.outcome, finished.reason
                 outlines.append(Outline(of.number, of.test, of.kind, of.label, *ending))
-                kept[finished.trial] = finished
                 continue
             with damaged.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
                 archived = self._archived(entry, finished)
                 if last:
                     outlines.append(Outline.of(archived))
-                    kept[finished.trial] = finished
                 else:
                     earlier.setdefault(finished.trial, []).append(archived)
         before = {number: tuple(tries) for number, tries in earlier.items()}
