@@ -200,6 +200,7 @@ class _Trials:
 
     Attributes:
         story: the journal.
+        names: its finished attempts, by the name of their group.
         groups: names of the top-level members of the file.
         whole: whether the index is unchanged since sealing; it can then replace journal lines.
         in_step: whether all texts are as sealed, and the index has exactly the records of the
@@ -210,6 +211,7 @@ class _Trials:
 
     path: Path
     story: Lines
+    names: Mapping[str, TrialFinished]
     groups: frozenset[str]
     whole: bool
     in_step: bool
@@ -222,7 +224,8 @@ class _Trials:
     ) -> _Trials:
         trees = _unchecked(texts, "trees/data")
         _is_as_sealed(texts, "trees/data", damaged)
-        recorded = [each.record for each in entry_names(story.attempts).values()]
+        names = entry_names(story.attempts)
+        recorded = [each.record for each in names.values()]
         # The records of a sealed journal, in its order, are the whole index: no second check.
         in_step = texts.line_digests("index/data") == recorded
         in_step = in_step and story.whole and not damaged.found
@@ -231,7 +234,8 @@ class _Trials:
         with damaged.noting(), safe_hdf5.guarded(path, "/run/not_kept"):
             not_kept = read_not_kept(texts)
         groups = frozenset(safe_hdf5.names(file))
-        return cls(path, story, groups, whole, in_step, _good_trees(trees), not_kept)
+        good = _good_trees(trees)
+        return cls(path, story, names, groups, whole, in_step, good, not_kept)
 
     @cached_property
     def index(self) -> bytes:
@@ -255,12 +259,12 @@ class _Trials:
         """
         outlines: list[Outline] = []
         earlier: dict[int, list[ArchivedTrial]] = {}
-        attempts = self._attempts()
+        names = self.names
         if self.whole and not self.in_step:
-            unknown = len(self.lines.keys() - {each.record for each in attempts})
+            names = self._all_names()
+            unknown = len(self.lines.keys() - {each.record for each in names.values()})
             if unknown:
                 damaged.add("/run/index", f"has {unknown} records that are not in the journal")
-        names = entry_names(attempts)
         kept = {finished.trial: finished for finished in names.values()}  # the last attempts
         planned = {each.number: each for each in plan} if self.in_step else {}
         for entry, finished in names.items():
@@ -284,16 +288,16 @@ class _Trials:
         with safe_hdf5.guarded(self.path, f"/{entry}"):
             return self._archived(entry, kept[number])
 
-    def _attempts(self) -> list[TrialFinished]:
-        """Finished attempts of the journal; the index replaces lost lines."""
+    def _all_names(self) -> Mapping[str, TrialFinished]:
+        """`names`, with attempts of the index in place of lost lines of the journal."""
+        if self.story.whole:
+            return self.names
         attempts = {(each.trial, each.attempt): each for each in self.story.attempts}
-        if self.whole and not self.story.whole:
-            known = {each.record for each in attempts.values()}
-            for digest in self.lines.keys() - known:
-                line = self.index[self.lines[digest]]
-                finished = _as_finished(parse_record(self.path, "/run/index", line))
-                attempts.setdefault((finished.trial, finished.attempt), finished)
-        return list(attempts.values())
+        for digest in self.lines.keys() - {each.record for each in attempts.values()}:
+            line = self.index[self.lines[digest]]
+            finished = _as_finished(parse_record(self.path, "/run/index", line))
+            attempts.setdefault((finished.trial, finished.attempt), finished)
+        return entry_names(attempts.values())
 
     def _archived(self, entry: str, finished: TrialFinished) -> ArchivedTrial:
         """A trial; record and trees come from its own group if the index lacks them."""
