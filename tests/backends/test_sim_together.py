@@ -76,6 +76,29 @@ def test_each_is_what_it_is_alone() -> None:
     assert [len(recording.time) for recording in recordings] == [1000, 250, 2500, 1000, 1]
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"sensors": {"gyro": {"noise": "1e-4 rad/s"}}, "controller": {"sample_rate": "1 kHz"}},
+        {"variation": {"seed": 1, "trial_to_trial": {"coulomb_torque": 0.1}}},
+    ],
+)
+def test_repeats_differ_by_their_seeds_only(change: dict[str, Any]) -> None:
+    """A backend prepares a bench once for all of them, unless its friction depends on the seed."""
+
+    def edit(tree: Any) -> None:
+        for name, table in change.items():
+            tree.setdefault(name, {}).update(table)
+
+    one = trial(bench(edit), task(base_acceleration=SWING, duration=0.5))
+    trials = [one.model_copy(update={"seed": seed}) for seed in (1, 2, 1)]
+    _, recordings = together(trials)
+    for each, recording in zip(trials, recordings, strict=True):
+        assert_equal(alone(each), recording)
+    rates = [recording["gyro_rate"].tobytes() for recording in recordings]
+    assert rates[0] == rates[2] != rates[1]
+
+
 def test_a_trial_ends_when_it_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """A short one is told of before the long one goes on: its file can be closed."""
     monkeypatch.setattr(simulate_module, "BLOCK_SAMPLES", 100)
