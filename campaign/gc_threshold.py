@@ -24,6 +24,6 @@ def paused_collection() -> Iterator[None]:
         yield
     finally:
         if enabled:
-            gc.freeze()  # makes them old objects, without the look at each of a collection
+            gc.freeze()  # with `unfreeze`: moves all objects to the oldest generation, unvisited
             gc.unfreeze()
             gc.enable()

@@ -107,8 +107,8 @@ class SimulatedTrial:
         """Record the next outputs (8, n), rows as `OUTPUTS`; the ending, or None.
 
         Args:
-            time, inputs: of the samples (s), and command and rate of the hull at these times; n
-                samples or more.
+            time: of the samples (s), shape (n,) or longer.
+            inputs: command and rate of the hull at `time`.
             half: the same outputs at half the step, for a step check.
         """
         ending = self._take(time[: out.shape[1]], inputs, out, half)

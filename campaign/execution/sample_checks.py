@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import numpy as np
 from pydantic import ValidationError
 
-from campaign.axis_kind import Sides, sides_in
+from campaign.axis_kind import sides_in
 from campaign.channels import in_known_unit, wrong_names
 from campaign.physics.bench import LimitsOptions
 from campaign.physics.limit_watch import WATCHED, LimitWatch
@@ -59,11 +58,6 @@ def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> ArchivedChannels
     """
     if strange := next((each for each in channels if not isinstance(each, ChannelInfo)), None):
         raise ValueError(f"a channel was announced as {type(strange).__name__!r}, no ChannelInfo")
-    return _archived(tuple(channels), trial.task.mode, sides_in(trial.bench))
-
-
-@lru_cache(maxsize=64)
-def _archived(channels: tuple[ChannelInfo, ...], mode: str, sides: Sides) -> ArchivedChannels:
     if wrong := wrong_names([channel.name for channel in channels]):
         raise ValueError(wrong)
     given = [
@@ -80,6 +74,7 @@ def _archived(channels: tuple[ChannelInfo, ...], mode: str, sides: Sides) -> Arc
         rate = channel.own_rate
         if rate is not None and not (isinstance(rate, int | float) and 0.0 < rate < math.inf):
             raise ValueError(f"{channel.name}: its own rate is {storable_tree(rate)!r} Hz")
+    sides, mode = sides_in(trial.bench), trial.task.mode
     converted = [in_known_unit(channel, mode, sides) for channel in given]
     return ArchivedChannels(
         tuple(channel for channel, _ in converted),

@@ -25,7 +25,7 @@ from campaign.trial import Task
 STRETCH_STEPS = 20_000
 """Steps of a trial between two checks of limits and stops."""
 BLOCK_STEPS, BLOCK_SAMPLES = 128_000, 16_000
-"""The same for a block; more samples exceed the processor's cache."""
+"""The same for a block; a quarter of these steps takes 6 % more time."""
 
 
 def simulate(

@@ -116,12 +116,12 @@ def sha256_of(
 
 
 def lines_of(path: Path, offset: int, size: int) -> Iterator[bytes]:
-    """Lines of `size` bytes of a file, without their ends, in constant memory."""
+    """Complete lines of `size` bytes of a file, without their ends, in constant memory."""
     with path.open("rb", buffering=_BLOCK) as file:
         file.seek(offset)
         for line in file:
             size -= len(line)
-            if size < 0:
+            if size < 0 or not line.endswith(b"\n"):
                 return
             yield line[:-1]
 

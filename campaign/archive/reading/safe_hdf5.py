@@ -196,7 +196,7 @@ def _raw_text(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, bytes]:
 
 
 def line_digests_at(parent: h5py.Group, name: str) -> Iterator[str]:
-    """SHA-256 of each line of a text, without its end; the text may be damaged."""
+    """SHA-256 of each complete line of a text, without its end; the text may be damaged."""
     place = _place_in_file(_text_id(parent, name))
     lines = _raw_text(parent, name)[1].split(b"\n")[:-1] if place is None else lines_of(*place)
     return (hashlib.sha256(line).hexdigest() for line in lines)
