@@ -247,7 +247,7 @@ def open_page(page: Path) -> None:
 
 def print_json(tree: Any) -> None:
     """Print JSON; unprintable characters are escaped, none is removed."""
-    print_line(json_text(tree))
+    print_text(f"{json_text(tree)}\n")  # wrapped lines would be no JSON
 
 
 def print_table(

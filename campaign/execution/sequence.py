@@ -60,6 +60,7 @@ class TrialSequence:
         live: bool,
     ) -> None:
         self._stages = stages
+        self._live = live
         self._batches = Batches(waiting, backend, workers, live=live)
         self._running: dict[Future[None], Sequence[Trial]] = {}
         self._under_way: dict[int, Trial] = {}
@@ -83,6 +84,9 @@ class TrialSequence:
         """Keep all workers busy. Raises errors of the archive, and KeyboardInterrupt."""
         try:
             while True:
+                while self._live and not self._running and not self.halted():
+                    if not self._writer.seal_next():  # it copies while the bench is at rest
+                        break
                 while len(self._running) < executor.most_pending and (batch := self._next()):
                     self._ledger.begin(*batch)
                     self._under_way |= {trial.number: trial for trial in batch}
@@ -101,7 +105,11 @@ class TrialSequence:
             raise
 
     def _hear(self, executor: BatchExecutor) -> None:
-        """Wait for ended trials and batches, and process all of them."""
+        """Process all ended trials and batches. If there are none: copy one ended trial of a
+        simulation into the sealed file, or wait.
+        """
+        if not self._live and self._news.empty() and self._writer.seal_next():
+            return
         try:
             news = [self._news.get(timeout=LOOK)]
         except Empty:

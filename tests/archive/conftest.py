@@ -107,9 +107,10 @@ def write_run(
 
 
 def write_trial(writer: RunWriter, trial: Trial, count: int | None, block: int = 1000) -> None:
-    """Record one trial in blocks of `block` samples."""
+    """Record one trial in blocks of `block` samples, and copy what waits into the sealed file."""
     if count is None:
         writer.begin(trial).finish(Ending(Outcome.FAULT, "no power"), STARTED, ENDED)
+        copy_ended(writer)
         return
     recorder = begin_trial(writer, trial, ())
     time, samples = make_samples(count, trial.number)
@@ -118,6 +119,13 @@ def write_trial(writer: RunWriter, trial: Trial, count: int | None, block: int =
         recorder.append(time[cut], samples[:, cut])
     recorder.event(Event(0.25, "the load breaks away ↗"))
     recorder.finish(Ending(Outcome.COMPLETED), STARTED, ENDED)
+    copy_ended(writer)
+
+
+def copy_ended(writer: RunWriter) -> None:
+    """Copy all that waits into the sealed file, as a run does between its trials."""
+    while writer.seal_next():
+        pass
 
 
 Samples = int | tuple[np.ndarray, np.ndarray]

@@ -22,7 +22,7 @@ ALL = ["trial_00001", "trial_00002", "trial_00003"]
 def writer(tmp_path: Path, kit) -> Iterator[RunWriter]:
     """A run of three trials, of which nothing is copied yet: four attempts, the second failed."""
     with pytest.MonkeyPatch.context() as late:
-        late.setattr(seal_run.Sealer, "advance", lambda self: None)
+        late.setattr(seal_run.Sealer, "advance", lambda self: False)
         writer, trials = kit.begin(tmp_path, 3, [20, None])
         kit.record(writer, trials[1], 30)
         kit.record(writer, trials[2], 40)

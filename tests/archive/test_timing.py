@@ -45,6 +45,8 @@ def test_writing_a_trial_and_sealing_are_told_as_what_they_are(tmp_path: Path) -
     ending = backend.execute(trial, recorder, lambda: False)
     assert {*heard.since()} == {Work.SETTING_UP, Work.ENGINE, Work.TRIAL_FILES}
     recorder.finish(ending, NOW, NOW)
-    assert heard.since() == [Work.TRIAL_FILES, Work.SEALING]
+    assert heard.since() == [Work.TRIAL_FILES]
+    assert writer.seal_next()
+    assert heard.since() == [Work.SEALING]
     writer.seal(RunStatus.COMPLETE, "", ended=NOW)
     assert heard.since() == [Work.SEALING]

@@ -168,6 +168,14 @@ class MemoryArchive:
     trials: dict[int, Trial] = field(default_factory=dict)
     stages: list[TrialsFollowed] = field(default_factory=list)
     measured: dict[int, tuple[Estimate, ...]] = field(default_factory=dict)
+    copied: int = 0
+    on_seal_next: Callable[[], object] = lambda: None
+
+    def seal_next(self) -> bool:
+        self.on_seal_next()
+        waiting = self.copied < len(self.attempts)
+        self.copied += waiting
+        return waiting
 
     def archived(self, number: int) -> MemoryTrialData:
         with self.lock:

@@ -15,11 +15,21 @@ import pytest
 
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode, UsageError
+from campaign.execution import sequence
 from campaign.execution.progress import Progress
 from campaign.execution.safety import AbortedError, NotSafeError, describe
+from campaign.execution.supervision import Supervision
 from campaign.recording import Ending, Fault, Outcome, SafeState
 from campaign.trial import Trial
-from tests.execution.fakes import COMPLETED, RATE, FakeBackend, Lab, OwnBackend, no_space
+from tests.execution.fakes import (
+    COMPLETED,
+    RATE,
+    FakeBackend,
+    Lab,
+    OwnBackend,
+    SwitchedBench,
+    no_space,
+)
 
 
 def raises(error: BaseException) -> Callable[[Callable[[], bool]], Ending]:
@@ -50,6 +60,11 @@ def ends(outcome: Outcome, reason: str = "", safe: SafeState = SafeState.CONFIRM
     return lambda stopped: Ending(outcome, reason, safe)
 
 
+def slowly(stopped: Callable[[], bool]) -> Ending:
+    time.sleep(0.1)
+    return COMPLETED
+
+
 def test_trials_are_executed_in_order_and_the_bench_is_made_safe_last():
     bench = Lab(3, FakeBackend())
     outcome = bench.run()
@@ -58,6 +73,33 @@ def test_trials_are_executed_in_order_and_the_bench_is_made_safe_last():
     assert outcome.exit_code is ExitCode.DONE
     assert bench.archive.sealed == ("complete", "", SafeState.CONFIRMED)
     assert bench.archive.samples == {1: 20, 2: 20, 3: 20}
+
+
+def test_ended_trials_are_copied_while_others_are_simulated():
+    may_end = threading.Event()
+
+    def until_copied(stopped: Callable[[], bool]) -> Ending:
+        assert may_end.wait(10.0)
+        return COMPLETED
+
+    bench = Lab(2, FakeBackend({2: until_copied}))
+    bench.archive.on_seal_next = lambda: bench.archive.copied and may_end.set()
+    assert bench.run().status is RunStatus.COMPLETE
+
+
+def test_ended_trials_are_copied_while_a_bench_is_at_rest(monkeypatch):
+    monkeypatch.setattr(sequence, "LOOK", 0.01)
+    bench = Lab(3, SwitchedBench(dict.fromkeys((1, 2, 3), slowly)))
+    moving = []
+
+    def look() -> None:
+        time.sleep(0.02)  # a trial that was submitted moves by now
+        moving.extend(bench.backend.moving)
+
+    bench.archive.on_seal_next = look
+    bench.run(supervision=Supervision(live=True))
+    assert moving == []
+    assert bench.archive.copied == 3
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from campaign.errors import ArchiveError
 from campaign.recording import Outcome
 
 _FREE = 1 << 28  # bytes of disk that stay free for the trials during copying
-_AT_ONCE = 2  # copies per finished trial; more than one, so that waiting trials are caught up
 _FAILURES = (OSError, RuntimeError, ValueError, ArchiveError)
 
 
@@ -68,10 +67,9 @@ def seal_folder(folder: Path, begun: SealedFile | None = None) -> Path:
 
 
 class Sealer:
-    """Copies trials into the sealed file during execution, in the thread that finished a trial.
+    """Copies trials into the sealed file during execution, one for each call of `advance`.
 
-    It has no thread of its own, which would only wait for h5py's single lock. On a moving bench it
-    copies between trials, while the bench is at rest.
+    It has no thread of its own, which would only wait for h5py's single lock.
 
     Trials are copied in the order of the plan, so that equal runs give equal files, independent of
     the load of the machine: a trial waits for those before it. A trial that did not complete at the
@@ -91,22 +89,19 @@ class Sealer:
         """Register a trial whose file is on the disk and whose line is in the journal."""
         self._first.setdefault(finished.trial, finished)
 
-    def advance(self) -> None:
-        """Copy the next trials, if finished and no other thread is copying; errors end copying."""
-        if not self._busy.acquire(blocking=False):
-            return
-        try:
-            for _ in range(_AT_ONCE):
-                if self._gave_up or self._next not in self._first:
-                    return
+    def advance(self) -> bool:
+        """Copy the next trial if it has finished; whether there was one. Errors end copying."""
+        with self._busy:
+            if self._gave_up or self._next not in self._first:
+                return False
+            try:
                 self._copy(self._first.pop(self._next))
                 self._next += 1
-        except BaseException as error:
-            self._give_up()
-            if not isinstance(error, _FAILURES):
-                raise
-        finally:
-            self._busy.release()
+            except BaseException as error:
+                self._give_up()
+                if not isinstance(error, _FAILURES):
+                    raise
+            return True
 
     def seal(self) -> Path:
         """Complete the file: `seal_folder`."""
