@@ -116,6 +116,7 @@ EDGES = """() => [...document.querySelectorAll(".scroll, .sheet")]
   .map((e) => { e.id ||= `wide-${e.parentElement.id}`; return e.id; })"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_what_goes_on_beyond_the_edge_says_so(show, scheme):
     """A shadow at the edge, until one is at the end; in a place where nothing is drawn."""
