@@ -12,7 +12,7 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -31,9 +31,9 @@ Trees = Mapping[str, Tree]
 """Benches and options by the SHA-256 of their canonical JSON."""
 
 _TREE = re.compile(r'\{"sha256":"([0-9a-f]{64})","tree":(\{.*\})\}')
-_DETERMINING = ("bench", "task", "seed")
-_DETERMINING_WHERE_THERE = ("truth", "recording")
-"""Fields of a trial that form its fingerprint; the latter only if they are not empty."""
+_DETERMINING = ("seed", "task")
+_DETERMINING_WHERE_THERE = ("recording", "truth")
+"""Fields of a trial that form its fingerprint with its bench; the latter if they are not empty."""
 
 
 class SeriesRecord(ArchivedModel):
@@ -138,9 +138,10 @@ class TrialRecord(ArchivedModel):
         `Trial.fingerprint` would change when a later program adds a field with a default, which
         old archives do not have.
         """
-        tree = {**self.trial, **{name: trees[str(self.trial[name])] for name in SHARED}}
-        names = (*_DETERMINING, *(name for name in _DETERMINING_WHERE_THERE if tree.get(name)))
-        return text_digest(canonical_json({name: tree[name] for name in names}))
+        there = (name for name in _DETERMINING_WHERE_THERE if self.trial.get(name))
+        what = {name: self.trial[name] for name in (*_DETERMINING, *there)}
+        bench = tree_text(trees[str(self.trial["bench"])])
+        return text_digest(f'{{"bench":{bench},{canonical_json(what)[1:]}')  # keys are sorted
 
     @cached_property
     def text(self) -> str:
@@ -184,15 +185,25 @@ def parse_trees(text: str) -> dict[str, Tree]:
     """Trees from JSON lines, checked against their digests. Raises ValueError for a bad line."""
     trees = {}
     for number, line in enumerate(text.splitlines(), start=1):
-        match = _TREE.fullmatch(line)
-        # The text of a tree is hashed unparsed: written trees are canonical.
-        if match is None or text_digest(match[2]) != match[1]:
-            raise ValueError(f"line {number} does not match its digest")
         try:
-            trees[match[1]] = json.loads(match[2])
-        except RecursionError:
-            raise ValueError(f"line {number} is nested too deeply") from None
+            digest, tree = _tree(line)
+        except ValueError as error:
+            raise ValueError(f"line {number} {error}") from None
+        trees[digest] = tree
     return trees
+
+
+@lru_cache(maxsize=64)
+def _tree(line: str) -> tuple[str, Tree]:
+    """Digest and tree of a line; cached, because successive trials share bench and options."""
+    match = _TREE.fullmatch(line)
+    # The text of a tree is hashed unparsed: written trees are canonical.
+    if match is None or text_digest(match[2]) != match[1]:
+        raise ValueError("does not match its digest")
+    try:
+        return match[1], json.loads(match[2])
+    except RecursionError:
+        raise ValueError("is nested too deeply") from None
 
 
 def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -85,18 +84,12 @@ def packed_record(
         raise ArchiveError(f"{path}: /{entry}/record/json: {safe_hdf5.MISMATCH}")
     record = parse_record(path, f"/{entry}/record", packed.record)
     try:
-        trees = _trees(packed.trees)
+        trees: Trees = parse_trees(packed.trees)
     except ValueError as error:
         raise ArchiveError(f"{path}: /{entry}/record/trees: {error}") from None
     if not record.tree_names <= trees.keys():
         raise ArchiveError(f"{path}: /{entry}/record/trees: its bench or its options are missing")
     return record, trees
-
-
-@lru_cache(maxsize=8)
-def _trees(text: str) -> Trees:
-    """Parse trees; cached, because successive trials usually share bench and options."""
-    return parse_trees(text)
 
 
 def parse_record(path: Path, place: str, text: str | bytes) -> TrialRecord:
