@@ -167,8 +167,7 @@ class Trial(Options):
             what["truth"] = self.truth
         if self.recording:
             what["recording"] = self.recording
-        text = f'{{"bench":{tree_text(self.bench)},{canonical_json(what)[1:]}'  # keys are sorted
-        return hashlib.sha256(text.encode()).hexdigest()
+        return fingerprint(self.bench, what)
 
     @property
     def apart_from_seed(self) -> tuple[str, str, Task]:
@@ -265,6 +264,12 @@ def canonical_json(tree: Any) -> str:
     return json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
+def fingerprint(bench: Tree, what: Mapping[str, Any]) -> str:
+    """SHA-256 of a bench and of all else that determines samples, as one canonical JSON text."""
+    text = f'{{"bench":{tree_text(bench)},{canonical_json(what)[1:]}'  # keys are sorted
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted path and value of all entries that are no tables."""
     for key, value in tree.items():
@@ -280,7 +285,7 @@ _TEXTS: dict[int, tuple[Tree, str]] = {}
 
 
 def tree_text(tree: Tree) -> str:
-    """`canonical_json` of an unchanged tree that trials share; recent texts are cached."""
+    """`canonical_json` of a tree that trials share, and nobody changes; recent texts are cached."""
     kept = _TEXTS.get(id(tree))  # the cached tree keeps its id
     if kept is None:
         if len(_TEXTS) >= _MOST_TEXTS:

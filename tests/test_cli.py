@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 from campaign.cli import main as command_line
 from campaign.cli import output
 from campaign.cli.kinds import show_kind
-from campaign.cli.output import PlainConsole, bytes_text, print_line, print_table
+from campaign.cli.output import PlainConsole, bytes_text, print_json, print_line, print_table
 from campaign.cli.prepare import find_protocol
 from campaign.cli.schemas import init_folder
 from campaign.cli.status import show_status
@@ -157,6 +158,16 @@ def test_a_table_on_a_terminal_breaks_no_word(
     assert ("317.2" in words) == (width != 60)  # spare, or below the others
     assert ("left out: size; with `| cat` all is shown" in lines) == (width == 60)
     assert capsys.readouterr().err == ""
+
+
+def test_json_is_not_wrapped_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A line end inside a string would be no JSON."""
+    on_a_terminal(monkeypatch, 40)
+    tree = {"reason": "one sentence that is longer than a line of this terminal is wide"}
+    print_json(tree)
+    assert json.loads(capsys.readouterr().out) == tree
 
 
 @pytest.mark.parametrize("width", range(60, 125, 7))

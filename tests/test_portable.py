@@ -58,7 +58,6 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("campaign/report/formats/pdf.py", "_is_root"): 'os.name == "posix"',
     ("campaign/report/formats/pdf.py", "_end_all"): 'os.name == "posix"',
     ("campaign/device/line.py", "PtyStream.__init__"): "this system has no pseudo-terminals",
-    ("campaign/execution/executors.py", "_initialize"): "Windows has no `nice`",
     ("campaign/execution/stop.py", "StopSwitch.on_signals"): 'if os.name == "posix":',
     ("campaign/execution/stop.py", "under_guardian"): "POSIX",
     ("campaign/execution/guardian.py", "main"): "POSIX",

@@ -6,11 +6,9 @@ them; it returns the journal entries with each trial's end, and the parent write
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import multiprocessing
 import multiprocessing.process
-import os
 import pickle
 import threading
 import time
@@ -41,8 +39,6 @@ from campaign.trial import Trial
 
 FORGOTTEN = 5.0
 """s after the death of a worker process until the pool must have reported each of its batches."""
-NICE = 5
-"""Priority of a worker below the parent, which gives all of them their work and copies trials."""
 FEWEST_FOR_PROCESSES = 300
 """Least number of trials for which processes save more time than their start costs."""
 PRELOADED = (
@@ -379,8 +375,6 @@ _folder: Path | None = None
 def _initialize(pickled: bytes, stopped: ctypes.c_bool) -> None:
     global _worker, _folder
     processes.initialize_worker()
-    with contextlib.suppress(AttributeError):  # Windows has no `nice`
-        os.nice(NICE)
     setup, _folder = pickle.loads(pickled)  # noqa: S301 - from the parent process
     _worker = BatchWorker(setup, lambda: bool(stopped.value))
 

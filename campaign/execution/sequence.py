@@ -29,6 +29,8 @@ from campaign.trial import Trial
 
 LOOK = 0.25
 """s between two updates of the display; longest delay of a stop request to the executor."""
+MOST_WAITING = 100
+"""Ended trials of simulations that wait for their copy before new trials wait for them."""
 ENDING = 10.0
 """s that the other trials may take to end when the run cannot continue."""
 MOST_LOST = 3
@@ -84,8 +86,8 @@ class TrialSequence:
         """Keep all workers busy. Raises errors of the archive, and KeyboardInterrupt."""
         try:
             while True:
-                while self._live and not self._running and not self.halted():
-                    if not self._writer.seal_next():  # it copies while the bench is at rest
+                while self._live and not (self._running or self._is_over()):  # it is at rest
+                    if not self._writer.seal_next():
                         break
                 while len(self._running) < executor.most_pending and (batch := self._next()):
                     self._ledger.begin(*batch)
@@ -105,13 +107,12 @@ class TrialSequence:
             raise
 
     def _hear(self, executor: BatchExecutor) -> None:
-        """Process all ended trials and batches. If there are none: copy one ended trial of a
-        simulation into the sealed file, or wait.
-        """
-        if not self._live and self._news.empty() and self._writer.seal_next():
-            return
+        """Process all ended trials and batches; wait for one if none is to be copied meanwhile."""
+        copied = not (self._live or self.halted()) and self._writer.seal_next(
+            1 if self._news.empty() else MOST_WAITING
+        )
         try:
-            news = [self._news.get(timeout=LOOK)]
+            news = [self._news.get(timeout=0.0 if copied else LOOK)]
         except Empty:
             self._ledger.look()
             executor.look()

@@ -131,7 +131,7 @@ def workers(run: RunReader, count: int, *, measure_anew: bool = False) -> Iterat
         yield Workers(run, measure_anew=measure_anew)
         return
     # The processes receive the data read and checked here; another read takes ten times as long.
-    handed = run, known_heaps()
+    handed = run, known_heaps(run.path)
     with processes.process_pool(count, PRELOADED, _begin, handed) as pool:
         at_work = Workers(run, pool, measure_anew)
         _ = at_work.found

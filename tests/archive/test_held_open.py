@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunReader, open_run
+from campaign.archive import RunReader, list_runs, open_run
 from campaign.archive.reading import global_heap_check, safe_hdf5
 from campaign.errors import ArchiveError
 from tests.archive.test_kept import KEPT
@@ -85,7 +85,7 @@ def test_what_is_known_of_heaps_is_told_another_process(
     monkeypatch.setattr(global_heap_check, "_known", {})
     run = open_run(path)
     assert looked == [path]
-    known = global_heap_check.known_heaps()
+    known = global_heap_check.known_heaps(path)
     global_heap_check._known.clear()  # as in a process that has just begun
     global_heap_check.add_known_heaps(known)
     read_all(run)
@@ -93,3 +93,15 @@ def test_what_is_known_of_heaps_is_told_another_process(
     path.touch()  # it may be another file by now
     read_all(run)
     assert looked == [path, path]
+
+
+def test_opening_and_listing_scan_no_file_for_heaps(
+    sealed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A scan reads the whole file; checksums are texts of fixed length, which are in no heap."""
+    monkeypatch.setattr(global_heap_check, "_known", {})
+    monkeypatch.setattr(global_heap_check, "_sound", None)
+    monkeypatch.setattr(safe_hdf5, "_SOUND", {})
+    assert open_run(sealed).damaged == ()
+    (listed,) = list_runs(sealed.parent)
+    assert listed.problem == ""

@@ -22,7 +22,7 @@ ALL = ["trial_00001", "trial_00002", "trial_00003"]
 def writer(tmp_path: Path, kit) -> Iterator[RunWriter]:
     """A run of three trials, of which nothing is copied yet: four attempts, the second failed."""
     with pytest.MonkeyPatch.context() as late:
-        late.setattr(seal_run.Sealer, "advance", lambda self: False)
+        late.setattr(seal_run.Sealer, "advance", lambda self, fewest: False)
         writer, trials = kit.begin(tmp_path, 3, [20, None])
         kit.record(writer, trials[1], 30)
         kit.record(writer, trials[2], 40)
@@ -58,6 +58,15 @@ def test_first_attempts_that_completed_are_copied_in_the_order_of_the_plan(seale
     assert copied(sealer) == [ALL[0], ALL[2]]
     sealer.discard()
     assert sealer._file is None
+
+
+def test_it_copies_only_if_so_many_wait(sealer, attempts):
+    sealer.add(attempts[0])
+    assert not sealer.advance(2)
+    sealer.add(attempts[3])
+    assert sealer.advance(2)
+    assert list(sealer._file.copied) == ALL[:1]
+    assert not sealer.advance(2)
 
 
 def test_a_second_attempt_is_not_copied_before_the_end(sealer, attempts):

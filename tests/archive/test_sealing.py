@@ -107,7 +107,7 @@ def test_a_copy_that_is_not_what_was_recorded_is_not_sealed(
     tmp_path, kit, monkeypatch, change, beside
 ):
     if not beside:
-        monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: False)
+        monkeypatch.setattr(seal_run.Sealer, "advance", lambda self, fewest: False)
     corrupt_copy(monkeypatch, change)
     writer, _ = kit.begin(tmp_path, 3, [20_001] * 3)
     refused(writer, "could not be sealed: .*trial_00002")
@@ -333,14 +333,14 @@ def test_equal_runs_make_equal_files_whatever_was_copied_when(tmp_path, kit, mon
     watched = Watched(monkeypatch)
     advance = seal_run.Sealer.advance
 
-    def late(sealer):
+    def late(sealer, fewest):
         return 3 in sealer._first and len(watched.beside) < 2 and advance(sealer)
 
     with monkeypatch.context() as held:
         held.setattr(seal_run.Sealer, "advance", late)
         files.append(written(tmp_path / "as it can", kit, [1, 2, 3]))
     assert (watched.beside, watched.at_the_end) == (ALL[:2], ALL[2:])
-    monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: False)
+    monkeypatch.setattr(seal_run.Sealer, "advance", lambda self, fewest: False)
     watched = Watched(monkeypatch)
     files.append(written(tmp_path / "at the end", kit, [1, 2, 3]))
     assert (watched.beside, watched.at_the_end) == ([], ALL)
@@ -501,7 +501,7 @@ def test_who_is_refused_or_interrupted_leaves_no_file_open(tmp_path, kit, monkey
     def fail(*arguments):
         raise error
 
-    monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: False)
+    monkeypatch.setattr(seal_run.Sealer, "advance", lambda self, fewest: False)
     monkeypatch.setattr(sealed_file.SealedFile, step, fail)
     writer, _ = kit.begin(tmp_path, 3, [50] * 3)
     before = open_files(tmp_path)

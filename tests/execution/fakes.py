@@ -171,9 +171,9 @@ class MemoryArchive:
     copied: int = 0
     on_seal_next: Callable[[], object] = lambda: None
 
-    def seal_next(self) -> bool:
+    def seal_next(self, fewest: int = 1) -> bool:
         self.on_seal_next()
-        waiting = self.copied < len(self.attempts)
+        waiting = len(self.attempts) - self.copied >= fewest
         self.copied += waiting
         return waiting
 

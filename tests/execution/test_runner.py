@@ -15,11 +15,11 @@ import pytest
 
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode, UsageError
-from campaign.execution import sequence
+from campaign.execution import external_stop, sequence
 from campaign.execution.progress import Progress
 from campaign.execution.safety import AbortedError, NotSafeError, describe
 from campaign.execution.supervision import Supervision
-from campaign.recording import Ending, Fault, Outcome, SafeState
+from campaign.recording import Ending, Fault, Outcome, PanicStop, SafeState
 from campaign.trial import Trial
 from tests.execution.fakes import (
     COMPLETED,
@@ -100,6 +100,22 @@ def test_ended_trials_are_copied_while_a_bench_is_at_rest(monkeypatch):
     bench.run(supervision=Supervision(live=True))
     assert moving == []
     assert bench.archive.copied == 3
+
+
+def test_a_panic_stop_is_noticed_between_two_copies_of_a_resumed_run(monkeypatch):
+    monkeypatch.setattr(external_stop, "INTERVAL", 0.0)
+    bench = Lab(1, SwitchedBench())
+    bench.archive.attempts = [(number, Outcome.COMPLETED) for number in range(2, 12)]
+
+    def press() -> None:
+        if bench.archive.copied == 3:
+            bench.backend.stop = PanicStop(1, "the button")
+
+    bench.archive.on_seal_next = press
+    run = bench.run(supervision=Supervision(live=True))
+    assert run.status is RunStatus.INTERRUPTED
+    assert "trial-00001" not in bench.backend.log
+    assert bench.archive.copied == 4
 
 
 @pytest.mark.parametrize(

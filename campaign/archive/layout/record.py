@@ -22,7 +22,7 @@ from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.header import ArchivedModel
 from campaign.estimate import Estimate, Window
 from campaign.recording import ChannelInfo, Ending, Fault, Outcome, SafeState
-from campaign.trial import Tree, Trial, canonical_json, tree_text
+from campaign.trial import Tree, Trial, canonical_json, fingerprint, tree_text
 
 SHARED = ("bench", "options")
 """Fields of a trial that are stored in `trees`."""
@@ -31,8 +31,8 @@ Trees = Mapping[str, Tree]
 """Benches and options by the SHA-256 of their canonical JSON."""
 
 _TREE = re.compile(r'\{"sha256":"([0-9a-f]{64})","tree":(\{.*\})\}')
-_DETERMINING = ("seed", "task")
-_DETERMINING_WHERE_THERE = ("recording", "truth")
+_DETERMINING = ("task", "seed")
+_DETERMINING_WHERE_THERE = ("truth", "recording")
 """Fields of a trial that form its fingerprint with its bench; the latter if they are not empty."""
 
 
@@ -140,8 +140,7 @@ class TrialRecord(ArchivedModel):
         """
         there = (name for name in _DETERMINING_WHERE_THERE if self.trial.get(name))
         what = {name: self.trial[name] for name in (*_DETERMINING, *there)}
-        bench = tree_text(trees[str(self.trial["bench"])])
-        return text_digest(f'{{"bench":{bench},{canonical_json(what)[1:]}')  # keys are sorted
+        return fingerprint(trees[str(self.trial["bench"])], what)
 
     @cached_property
     def text(self) -> str:
@@ -193,9 +192,9 @@ def parse_trees(text: str) -> dict[str, Tree]:
     return trees
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _tree(line: str) -> tuple[str, Tree]:
-    """Digest and tree of a line; cached, because successive trials share bench and options."""
+    """Digest and tree of a line; successive trials share it, so it must not be changed."""
     match = _TREE.fullmatch(line)
     # The text of a tree is hashed unparsed: written trees are canonical.
     if match is None or text_digest(match[2]) != match[1]:

@@ -29,8 +29,10 @@ def heaps_are_sound(path: Path) -> bool:
     return _known[looked]
 
 
-def known_heaps() -> dict[Looked, bool]:
-    """Results of this process, for another process, which then does not repeat the checks."""
+def known_heaps(path: Path) -> dict[Looked, bool]:
+    """Results of this process, that of `path` included if it is a file, for other processes."""
+    if path.is_file():
+        heaps_are_sound(path)
     return dict(_known)
 
 

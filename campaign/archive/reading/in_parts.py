@@ -32,5 +32,5 @@ def in_parts(
         yield from (work(path, part) for part in parts)
         return
     preload = (work.__module__,)
-    with processes.process_pool(count, preload, add_known_heaps, known_heaps()) as pool:
+    with processes.process_pool(count, preload, add_known_heaps, known_heaps(path)) as pool:
         yield from processes.in_order(pool, partial(work, path), parts)

@@ -285,18 +285,20 @@ def text_list(item: h5py.HLObject, name: str) -> list[str]:
 
 
 def _attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> h5a.AttrID:
-    raw = name.encode()
-    file = h5f.get_name(item)
-    if file not in _SOUND:  # only attributes are stored in the heaps
-        _SOUND[file] = heaps_are_sound(Path(os.fsdecode(file)))
-    if not _SOUND[file]:
-        raise ArchiveError(f"{os.fsdecode(file)}: cannot be read: its attributes are damaged")
     try:
-        identifier = h5a.open(item, raw)
+        identifier = h5a.open(item, name.encode())
     except KeyError:
         raise ArchiveError(f"{_named(item)}@{name}: is missing") from None
     if identifier.get_storage_size() > _LARGEST_ATTRIBUTE:
         raise ArchiveError(f"{_named(item)}@{name}: is too large")
+    kind = identifier.get_type()
+    if not isinstance(kind, h5t.TypeStringID) or kind.is_variable_str():  # it is in a heap
+        file = h5f.get_name(item)
+        if file not in _SOUND:
+            _SOUND[file] = heaps_are_sound(Path(os.fsdecode(file)))
+        if not _SOUND[file]:
+            what = "cannot be read: its attributes are damaged"
+            raise ArchiveError(f"{os.fsdecode(file)}: {what}")
     return identifier
 
 

@@ -155,9 +155,17 @@ def _put_scalar(
     plan = _scalar_plan(compact=len(raw) <= SHORT)
     made = h5d.create(group.id, name.encode(), kind, _SCALAR, plan)
     made.write(h5s.ALL, h5s.ALL, value, kind)
-    dataset = h5py.Dataset(made)
-    put_attribute(dataset, CHECKSUM, hashlib.sha256(raw).hexdigest())
-    return dataset
+    _put_checksum(made, hashlib.sha256(raw).hexdigest())
+    return h5py.Dataset(made)
+
+
+def _put_checksum(dataset: h5d.DatasetID, digest: str) -> None:
+    """Write a checksum as a text of fixed length, which is not in a global heap: before it reads
+    a heap, a reader scans the whole file (`global_heap_check`).
+    """
+    kind = _text_kind(len(digest))
+    attribute = h5a.create(dataset, CHECKSUM.encode(), kind, _SCALAR)
+    attribute.write(np.array(digest, dtype="S"), kind)
 
 
 @cache
@@ -176,7 +184,7 @@ def put_long_text(group: h5py.Group, name: str, text: LongText) -> int:
     plan.set_alloc_time(h5d.ALLOC_TIME_EARLY)
     plan.set_fill_time(h5d.FILL_TIME_NEVER)
     made = h5d.create(group.id, name.encode(), _text_kind(text.size), _SCALAR, plan)
-    put_attribute(h5py.Dataset(made), CHECKSUM, text.sha256)
+    _put_checksum(made, text.sha256)
     return int(made.get_offset())
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-import threading
 from pathlib import Path
 
 from campaign.archive.layout.entries import entry_name, entry_names
@@ -69,7 +68,7 @@ def seal_folder(folder: Path, begun: SealedFile | None = None) -> Path:
 class Sealer:
     """Copies trials into the sealed file during execution, one for each call of `advance`.
 
-    It has no thread of its own, which would only wait for h5py's single lock.
+    One thread calls it. A thread of its own would only wait for h5py's single lock.
 
     Trials are copied in the order of the plan, so that equal runs give equal files, independent of
     the load of the machine: a trial waits for those before it. A trial that did not complete at the
@@ -79,7 +78,6 @@ class Sealer:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._busy = threading.Lock()
         self._file: SealedFile | None = None
         self._first: dict[int, TrialFinished] = {}
         self._next = 1
@@ -89,31 +87,34 @@ class Sealer:
         """Register a trial whose file is on the disk and whose line is in the journal."""
         self._first.setdefault(finished.trial, finished)
 
-    def advance(self) -> bool:
-        """Copy the next trial if it has finished; whether there was one. Errors end copying."""
-        with self._busy:
-            if self._gave_up or self._next not in self._first:
-                return False
-            try:
-                self._copy(self._first.pop(self._next))
-                self._next += 1
-            except BaseException as error:
-                self._give_up()
-                if not isinstance(error, _FAILURES):
-                    raise
-            return True
+    def advance(self, fewest: int = 1) -> bool:
+        """Copy the next trial if it has finished and so many wait; whether there was one.
+
+        Errors end copying.
+        """
+        if self._gave_up or self._next not in self._first or len(self._first) < fewest:
+            return False
+        try:
+            self._copy(self._first.pop(self._next))
+            self._next += 1
+        except BaseException as error:
+            self.discard()
+            if not isinstance(error, _FAILURES):
+                raise
+        return True
 
     def seal(self) -> Path:
         """Complete the file: `seal_folder`."""
-        with self._busy:
-            begun, self._file = self._file, None
-            self._gave_up = True
-            return seal_folder(self._folder, begun)
+        begun, self._file = self._file, None
+        self._gave_up = True
+        return seal_folder(self._folder, begun)
 
     def discard(self) -> None:
-        """Remove the file."""
-        with self._busy:
-            self._give_up()
+        """Remove the file; nothing is copied any more."""
+        self._gave_up = True
+        if self._file is not None:
+            self._file.discard()
+            self._file = None
 
     def _copy(self, first: TrialFinished) -> None:
         if first.outcome is not Outcome.COMPLETED or first.attempt != 1:
@@ -123,9 +124,3 @@ class Sealer:
         if self._file is None:
             self._file = SealedFile(self._folder / SEALING)
         self._file.copy(self._folder, first, entry_name(first.trial))
-
-    def _give_up(self) -> None:
-        self._gave_up = True
-        if self._file is not None:
-            self._file.discard()
-            self._file = None
