@@ -361,7 +361,7 @@ def _by_profile(fit: DirectionFit, model: Model, told: Estimate) -> Estimate:
 
 
 def _at_bound(fit: DirectionFit, model: Model, plain: Estimate) -> Estimate:
-    """One-sided by profile for friction that would be negative; else refused: the search ended."""
+    """Estimate at a bound: one-sided by profile for friction of a curve, otherwise refused."""
     curve, name, value = fit.fits[model], plain.name, plain.value
     physical = name in ("viscous_friction", "coulomb_torque", "static_torque")
     if not physical or model == "none":
