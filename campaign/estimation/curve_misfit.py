@@ -37,18 +37,18 @@ class CurveMisfit:
     covariance: Array
 
     def moves(self, influence: Array) -> float:
-        """What it can move a parameter by (1 sigma, in its unit).
+        """Possible shift of a parameter by the difference (1 sigma, in its unit).
 
-        influence: how the parameter follows each torque, times its deviation, shape (n,).
+        influence: derivative of the parameter by each torque, times its deviation, shape (n,).
         """
         return float(np.sqrt(influence @ self.covariance @ influence))
 
 
 def curve_misfit(speed: Array, residuals: Array, influence: Array) -> CurveMisfit | None:
-    """The misfit of a least-squares fit, None where residuals show none.
+    """Misfit of a least-squares fit; None where the residuals show none.
 
     K is the correlation of the difference at two speeds. Its length is the range of the speeds over
-    one more than the parameters: the curve follows what varies over more. r'Kr / r'r tests against
+    one more than the parameters: the curve follows variations over more. r'Kr / r'r tests against
     scatter alone (King and Hillier, J. R. Stat. Soc. B 47 (1985) 98), by the beta distribution with
     its exact mean and variance (Durbin and Watson, Biometrika 38 (1951) 159). The variances of
     scatter and difference are those for which r'r and r'Kr are as expected (C. R. Rao, J.
@@ -57,14 +57,14 @@ def curve_misfit(speed: Array, residuals: Array, influence: Array) -> CurveMisfi
     Args:
         speed: rad/s, shape (n,).
         residuals: over the deviation of each, shape (n,).
-        influence: how the parameters follow each torque, times its deviation, shape (k, n).
+        influence: derivatives of the parameters by each torque, times its deviation, (k, n).
     """
     place = np.log(speed)
     length = float(np.ptp(place)) / (len(influence) + 1)
     kernel = np.exp(-0.5 * (np.subtract.outer(place, place) / length) ** 2)
     norm = np.linalg.norm(influence, axis=1, keepdims=True)
     scaled = influence / np.maximum(norm, np.finfo(float).tiny)
-    # What a fit leaves of torques: all that no parameter follows.
+    # Projection on the residuals: all torques that no parameter follows.
     left = np.eye(len(place)) - np.linalg.pinv(scaled, rcond=NULL) @ scaled
     rest, freedom = left @ residuals, round(float(np.trace(left)))
     sizes = np.linalg.eigvalsh(left @ kernel @ left)[-freedom:]
@@ -80,9 +80,9 @@ def curve_misfit(speed: Array, residuals: Array, influence: Array) -> CurveMisfi
 
 
 def _p_value(ratio: float, sizes: Array) -> float:
-    """Chance of a larger r'Kr / r'r of scatter alone.
+    """Probability of a larger r'Kr / r'r by scatter alone.
 
-    sizes: eigenvalues of K in what a fit leaves, rising, shape (m,).
+    sizes: eigenvalues of K, projected on the residuals, in rising order, shape (m,).
     """
     from scipy.special import betaincc
 

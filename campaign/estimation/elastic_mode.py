@@ -1,18 +1,18 @@
-"""The first elastic mode of a torque-to-rate response: resonance and antiresonance.
+"""First elastic mode of a torque-to-rate response: resonance and antiresonance.
 
-An elastic part hung on the load multiplies the smooth response of the rigid axis by
+An elastic part on the load multiplies the smooth response of the rigid axis by
 
     (wz^2 - w^2 + 2 i dz wz w) / (wp^2 - w^2 + 2 i dp wp w) * wp^2 / wz^2
 
-with its own frequency as antiresonance wz, and the resonance wp of part and load together. Their
-intervals follow from what the fit leaves over, be it noise or friction: Student's t, with the
-freedom of as many residuals as neighbours do not know of each other.
+The antiresonance wz is the natural frequency of the part alone, the resonance wp that of part and
+load together. Intervals follow from the residuals of the fit (noise and friction): Student's t,
+with the degrees of freedom reduced by the correlation of neighboring residuals.
 
 Friction in phase with the rate, D times the reaction of the inertia, divides the part's share of
-the inertia by 1 - iD: the distance of resonance and antiresonance falls by 1 / (1 + D^2), and the
-resonance is damped by D times what is left of it. The smooth response leads that of an inertia by
-the angle of this D, a delay apart. Viscous friction leads by up to twice that: therefore both are
-systematic parts and no corrections.
+the inertia by 1 - iD. The distance of resonance and antiresonance falls by 1 / (1 + D^2), and D
+times the remaining distance adds to the damping of the resonance. Apart from a delay, the smooth
+response leads that of an inertia by arctan D. Viscous friction leads by up to twice that angle:
+therefore both effects are systematic parts, not corrections.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ from campaign.estimation.gate import admitted, refused
 from campaign.estimation.intervals import shifted_by, with_error
 
 SPAN = 2.0
-"""The response is smooth, but for the mode, from the candidate over this to the candidate times
-this: a complex parabola over the logarithm of frequency."""
+"""Factor from a candidate frequency to both ends of its window. There, the response without the
+mode is a complex parabola over the logarithm of frequency."""
 FEWEST_POINTS = 12
-"""in the window of a fit."""
+"""Fewest points in the window of a fit."""
 EVIDENCE = 4.0
-"""A mode must divide the squared residual of a smooth response by this ..."""
+"""Least factor by which a mode reduces the squared residual of a smooth response."""
 SMALLEST_PEAK = 0.03
-"""... and stand out of it by this share."""
+"""Least height of a mode, relative to the smooth response."""
 APART = 0.3
-"""Logarithm of antiresonance over resonance up to which the parabola stands for all else."""
+"""Largest logarithm of antiresonance over resonance: up to it the parabola fits the rest."""
 WIDE = 0.5
-"""Damping ratio up to which a mode is narrower than the window of its fit."""
+"""Largest damping ratio: up to it a mode is narrower than the window of its fit."""
 NEARLY = 0.99
-"""of these is at a bound: the response is no small mode on top of a smooth one."""
+"""Share of these from which a fit is at a bound: no small mode on top of a smooth response."""
 
 
 @dataclass(frozen=True)
 class ElasticMode:
-    """A mode found.
+    """An elastic mode.
 
     Attributes:
-        frequency: its resonance (Hz).
-        damping_ratio: of that resonance.
+        frequency: resonance (Hz).
+        damping_ratio: of the resonance.
         antiresonance: (Hz); below the resonance for a part that hangs on the load.
     """
 
@@ -60,11 +60,10 @@ class ElasticMode:
 
 
 def elastic_mode(response: Response) -> ElasticMode | None:
-    """The most prominent mode of a response.
+    """Most prominent mode of a response.
 
-    None when the response is smooth without one, and where antiresonance and resonance lie too far
-    apart, or are hardly told apart. Not determined where a spring holds the axis at the lowest
-    frequencies.
+    None for a smooth response, and where antiresonance and resonance are too far apart or not
+    separable. Not determined where a spring holds the axis at the lowest frequencies.
     """
     frequency = response.frequency
     logarithm = np.log(np.maximum(np.abs(response.values), 1e-300)) + 1j * response.phase
@@ -77,21 +76,21 @@ def elastic_mode(response: Response) -> ElasticMode | None:
             gain = _evidence(frequency[window], logarithm[window], float(candidate), damping)
             if best is None or gain > best[0]:
                 best = gain, float(candidate)
-    found = None if best is None else _refine(frequency, logarithm, best[1])
+    mode = None if best is None else _refine(frequency, logarithm, best[1])
     why = held_by_spring(response)
-    if found is None or not why:
-        return found
+    if mode is None or not why:
+        return mode
     return replace(
-        found,
-        frequency=refused(found.frequency, why),
-        damping_ratio=refused(found.damping_ratio, why),
-        antiresonance=refused(found.antiresonance, why),
+        mode,
+        frequency=refused(mode.frequency, why),
+        damping_ratio=refused(mode.damping_ratio, why),
+        antiresonance=refused(mode.antiresonance, why),
     )
 
 
 def _window(frequency: Array, centre: float) -> Flags:
     inside: Flags = (frequency >= centre / SPAN) & (frequency <= centre * SPAN)
-    # A mode at the edge of the sweep cannot be told from the smooth part.
+    # A mode at the edge of the sweep cannot be separated from the smooth part.
     whole = frequency[0] <= centre / SPAN**0.5 and frequency[-1] >= centre * SPAN**0.5
     return inside if whole else np.zeros_like(inside)
 
@@ -102,13 +101,13 @@ def _smooth(frequency: Array) -> ComplexArray:
 
 
 def _left(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
-    """What is left of `values` after the best combination of `basis`."""
-    found, *_ = np.linalg.lstsq(basis, values, rcond=None)
-    return np.asarray(values - basis @ found)
+    """Residuals of `values` after the best combination of `basis`."""
+    coefficients, *_ = np.linalg.lstsq(basis, values, rcond=None)
+    return np.asarray(values - basis @ coefficients)
 
 
 def _evidence(frequency: Array, values: ComplexArray, centre: float, damping: float) -> float:
-    """By what a small mode at `centre` divides the squared residual."""
+    """Factor by which a small mode at `centre` reduces the squared residual."""
     basis = _smooth(frequency)
     small = frequency**2 / (centre**2 - frequency**2 + 2j * damping * centre * frequency)
     without = np.sum(np.abs(_left(basis, values)) ** 2)
@@ -117,7 +116,7 @@ def _evidence(frequency: Array, values: ComplexArray, centre: float, damping: fl
 
 
 def _mode(frequency: Array, p: Array) -> ComplexArray:
-    """Log of the factor above; p: resonance, its damping, log(antiresonance / resonance), its."""
+    """Logarithm of the factor above; p: wp, dp, ln(wz / wp), dz."""
     pole, zero = p[0], p[0] * np.exp(p[2])
     up = zero**2 - frequency**2 + 2j * p[3] * zero * frequency
     down = pole**2 - frequency**2 + 2j * p[1] * pole * frequency
@@ -154,7 +153,7 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
 def _lead(frequency: Array, phase: Array) -> float:
     """Angle (rad) by which a smooth response of this phase (rad) leads that of an inertia.
 
-    A delay is a part in proportion to the frequency (Hz). Both have shape (n,).
+    A delay adds a phase proportional to the frequency (Hz). Both have shape (n,).
     """
     basis = np.column_stack([np.ones_like(frequency), frequency])
     constant, _ = np.linalg.lstsq(basis, phase, rcond=None)[0]
@@ -162,15 +161,15 @@ def _lead(frequency: Array, phase: Array) -> float:
 
 
 def _mode_found(p: Array, jacobian: Array, left: Array, drag: float) -> ElasticMode | None:
-    """The mode of the parameters `p` of `_mode`, with intervals.
+    """Mode with intervals, from the parameters `p` of `_mode`.
 
-    None where the antiresonance does not surely lie below the resonance: of a part that hangs on
-    the load it does, and friction that yields with falling amplitude has neither.
+    None where the antiresonance is not significantly below the resonance: an elastic part on the
+    load has it there, and friction that yields at falling amplitude has neither.
 
     drag: friction over the reaction of the inertia, D above.
 
-    The smooth part is linear and projected out of residuals and Jacobian alike, so that J^T J is
-    the information on the mode alone.
+    The linear smooth part is projected out of residuals and Jacobian: J^T J is the information on
+    the mode alone.
     """
     freedom = _freedom(left, len(p) + 6)  # the parabola has six real numbers
     variance = float(left @ left) / freedom if freedom > 0 else np.nan
@@ -198,10 +197,10 @@ def _mode_found(p: Array, jacobian: Array, left: Array, drag: float) -> ElasticM
 def _freedom(left: Array, parameters: int) -> float:
     """Degrees of freedom of residuals over frequency (real parts, then imaginary parts).
 
-    Neighbours that resemble each other count less, by (1 - r) / (1 + r) of their correlation r.
+    The correlation r of neighbors reduces them by the factor (1 - r) / (1 + r).
     """
     halves = left.reshape(2, -1)
     power = float(np.sum(halves**2))
-    together = float(np.sum(halves[:, 1:] * halves[:, :-1])) / power if power > 0 else 0.0
-    alike = min(max(together, 0.0), 0.95)
+    correlation = float(np.sum(halves[:, 1:] * halves[:, :-1])) / power if power > 0 else 0.0
+    alike = min(max(correlation, 0.0), 0.95)
     return (len(left) - parameters) * (1.0 - alike) / (1.0 + alike)

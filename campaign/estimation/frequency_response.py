@@ -1,8 +1,8 @@
 """Frequency responses measured sine by sine: closed loop, open loop, level and phase.
 
-What they say about a loop is read elsewhere: `crossings` (where a level is passed, and how surely),
-`servo` (bandwidth and margins), `continuation` (how a loop goes on above its sweep), `refinement`
-(where a second sweep should measure).
+Other modules evaluate them: `crossings` (crossings of a level, and their significance), `servo`
+(bandwidth and margins), `continuation` (extrapolation of a loop above its sweep), `refinement`
+(frequencies of a second sweep).
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from campaign.estimation.sine_point import SinePoint, mean_point
 from campaign.reason import NONE, Cause, Reason
 
 MOST_ERROR = 0.2
-"""of a point's own size: with more its phase is hardly known, nor its level."""
+"""Largest error of a usable point, relative to its size; above it, phase and level are useless."""
 NEIGHBOURS = 2
-"""Points on each side whose median size with it stands for its own."""
+"""Points on each side of a point that its median size includes."""
 SPRING = 0.25 * np.pi
-"""Lead (rad) of rate before torque from which on the spring's reaction, less that of the inertia,
-exceeds that of damping. Dry friction that slides acts in phase with the rate above all. It is four
-standard deviations of the phase of a point with `MOST_ERROR`."""
+"""Lead (rad) of the rate above which the reaction of a spring, less that of the inertia, exceeds
+that of damping. Sliding dry friction acts mainly in phase with the rate. The lead is four standard
+deviations of the phase of a point with `MOST_ERROR`."""
 HELD = Cause(
     "held by a spring",
     "the rate leads the torque by {degrees:.0f}° at {frequency:.3g} Hz: a spring holds the axis, "
@@ -32,11 +32,11 @@ HELD = Cause(
 BESIDE = 2.0**0.5
 """Ratio of frequencies within which a load on a spring changes the inertia, and friction little."""
 DRY = 0.5 * np.pi - 4.0 / np.pi
-"""Largest share of dry friction in phase with the acceleration, over that in phase with the rate,
-under a sine of torque: where the axis is about to stop (Den Hartog, Trans. ASME 53 (1931) 107)."""
+"""Largest part of dry friction in phase with the acceleration, over the part in phase with the
+rate, for a sine torque that almost stops the axis (Den Hartog, Trans. ASME 53 (1931) 107)."""
 SURELY = 3.0
-"""Standard deviations by which the inertia must fall: the largest of some hundred differences of
-noisy points exceeds it about once in twenty times."""
+"""Standard deviations by which the inertia must fall. The largest of some hundred differences of
+noisy points exceeds it in about one of twenty cases."""
 NO_LOAD = Cause(
     "no load on a spring",
     "at {frequency:.3g} Hz the inertia in the response does not fall by more than friction "
@@ -46,7 +46,7 @@ NO_LOAD = Cause(
 
 @dataclass(frozen=True)
 class Response:
-    """A frequency response: arrays of shape (n,), by rising frequency (Hz); see `SinePoint`."""
+    """Frequency response: arrays of shape (n,), by rising frequency (Hz); see `SinePoint`."""
 
     frequency: Array
     values: ComplexArray
@@ -70,10 +70,10 @@ class Response:
 
     @property
     def size(self) -> Array:
-        """Magnitude, the median of a point's and its neighbours', shape (n,).
+        """Magnitude: median over each point and its neighbors, shape (n,).
 
-        What weights and thresholds go by: a point that noise makes large would else seem surer than
-        one that noise makes small.
+        For weights and thresholds: with its own magnitude, a point that noise increases would seem
+        more certain than one that noise reduces.
         """
         padded = np.pad(np.abs(self.values), NEIGHBOURS, constant_values=np.nan)
         near = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
@@ -81,7 +81,7 @@ class Response:
 
     @property
     def told(self) -> Response:
-        """The points whose error is below `MOST_ERROR` of their size."""
+        """Usable points: their error is below `MOST_ERROR` of their size."""
         if not len(self.frequency):
             return self
         kept = self.error < MOST_ERROR * self.size
@@ -91,46 +91,46 @@ class Response:
 
 
 def held_by_spring(response: Response) -> Reason:
-    """Why a response of torque to rate is none of a free axis; false where it may be one.
+    """Reason why a torque-to-rate response is not that of a free axis; false where it may be.
 
-    A free axis lags below its first antiresonance, whatever is elastic in it. Where bristles or any
-    other spring hold it, the rate leads below the first resonance, and the gain rises up to it. Of
-    a free axis with the sign reversed it falls.
+    The rate of a free axis lags below its first antiresonance, with any elastic parts. Where
+    bristles or another spring hold the axis, the rate leads below the first resonance, and the gain
+    rises up to it. For a free axis with reversed sign the gain falls.
     """
-    told = response.told
-    if len(told.frequency) < 2:
+    usable = response.told
+    if len(usable.frequency) < 2:
         return NONE
-    size, lead = np.abs(told.values), float(np.angle(told.values[0]))
+    size, lead = np.abs(usable.values), float(np.angle(usable.values[0]))
     if np.max(size) <= size[0] or not SPRING < lead < np.pi - SPRING:
         return NONE
-    return HELD(frequency=float(told.frequency[0]), degrees=float(np.degrees(lead)))
+    return HELD(frequency=float(usable.frequency[0]), degrees=float(np.degrees(lead)))
 
 
 def no_load_at(response: Response, frequency: float) -> Reason:
-    """Why no load swings on a spring at `frequency` (Hz); false where one shows in the response.
+    """Reason why no load on a spring resonates at `frequency` (Hz); false where one does.
 
-    The imaginary part of torque over rate, divided by w, is the inertia that moves. Below its own
-    frequency a load adds to it, above it takes from it. A spring to the ground, as of bristles,
-    only takes from it, and less the higher the frequency: there the inertia rises. Dry friction
-    that slides adds up to `DRY` of its damping.
+    The imaginary part of torque over rate, divided by w, is the moving inertia. A load increases it
+    below its natural frequency and reduces it above. A spring to the ground, such as bristles,
+    only reduces it, and less at higher frequencies: there the inertia rises with frequency.
+    Sliding dry friction adds up to `DRY` of its damping.
     """
-    told = response.told
-    rate, square = 2.0 * np.pi * told.frequency, np.maximum(np.abs(told.values) ** 2, 1e-300)
-    resistance, error = told.values.conj() / square, SURELY * told.error / square / rate
+    usable = response.told
+    rate, square = 2.0 * np.pi * usable.frequency, np.maximum(np.abs(usable.values) ** 2, 1e-300)
+    resistance, error = usable.values.conj() / square, SURELY * usable.error / square / rate
     inertia, damping = resistance.imag / rate, np.maximum(resistance.real, 0.0) / rate
-    below, above = told.frequency < frequency, told.frequency > frequency
+    below, above = usable.frequency < frequency, usable.frequency > frequency
     if not below.any() or not above.any():
         return NO_LOAD(frequency=frequency)
-    nearest = told.frequency[below][-1], told.frequency[above][0]
-    below &= told.frequency >= min(frequency / BESIDE, nearest[0])
-    above &= told.frequency <= max(frequency * BESIDE, nearest[1])
+    nearest = usable.frequency[below][-1], usable.frequency[above][0]
+    below &= usable.frequency >= min(frequency / BESIDE, nearest[0])
+    above &= usable.frequency <= max(frequency * BESIDE, nearest[1])
     before, after = inertia[below] - DRY * damping[below], inertia[above]
     fall = np.subtract.outer(before, after) - np.hypot.outer(error[below], error[above])
     return NONE if np.max(fall) > 0 else NO_LOAD(frequency=frequency)
 
 
 def make_response(points: Sequence[SinePoint]) -> Response:
-    """Points by rising frequency; repetitions of a frequency are averaged."""
+    """Response from points, by rising frequency; repetitions of a frequency are averaged."""
     groups: dict[float, list[SinePoint]] = {}
     for point in points:
         groups.setdefault(point.frequency, []).append(point)
@@ -144,7 +144,7 @@ def make_response(points: Sequence[SinePoint]) -> Response:
 
 
 def open_loop(closed: Response) -> Response:
-    """L = T / (1 - T): error to output, of a closed loop T with unit feedback."""
+    """L = T / (1 - T), error to output, from a closed loop T with unit feedback."""
     rest = 1.0 - closed.values
     rest = np.where(np.abs(rest) > 0, rest, 1e-300)
     return replace(closed, values=closed.values / rest, error=closed.error / np.abs(rest) ** 2)

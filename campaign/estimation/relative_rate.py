@@ -1,9 +1,9 @@
 """Rate of the load relative to the hull, from quantized sensors.
 
-A difference of encoder counts is a row of spikes, each one count per sample high. A straight line
-through a window of counts has the slope of the motion: it is the same backwards in time, so that
-it delays nothing, and it leaves what moves at a constant acceleration as it is. How long the window
-has to be follows from one count and from how small a rate is to be seen (`window_for`).
+A difference of encoder counts is a series of spikes of one count per sample. A straight line
+through a window of counts has the slope of the motion. It is symmetric in time: it has no delay,
+and is exact for a constant acceleration. The length of the window follows from one count and the
+smallest rate to resolve (`window_for`).
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from campaign.arrays import Array
 from campaign.estimation.time_stuck import SIGMAS, count_of, noise_of
 
 WORST_COUNT = 1.5
-"""Slope that one count, wherever in a window, adds at most: times a count per window."""
+"""Largest slope that one count at any place of a window adds, in counts per window."""
 SHORTEST = 3
-"""Samples of a line; fewer have no middle."""
+"""Fewest samples of a line; fewer have no middle."""
 STOP_FACTOR = 4.0
-"""Rate that ends a torque ramp, over the rate that counts as sliding: enough to see it slide."""
+"""Rate that ends a torque ramp, over the threshold of sliding: enough to show the sliding."""
 STOP_COUNTS = 2.0
-"""Counts of the rate that end a torque ramp, at least: a load that creeps shows one at a time."""
+"""Fewest counts of the rate that end a torque ramp: a creeping load shows one at a time."""
 LONGEST = 0.2
-"""s over which a rate of counts is smoothed on a ramp, at most: a load gathers speed as fast."""
+"""Longest smoothing of a rate of counts on a ramp (s): a load accelerates within such a time."""
 
 
 @dataclass(frozen=True)
 class RelativeRate:
-    """A relative rate, and how it was come by.
+    """Relative rate and its origin.
 
     Attributes:
         values: rad/s, shape (n,); NaN within half a window of the ends and of lost samples.
-        window: of the filter (s); 0 for the rate as it was recorded.
-        finest: rate (rad/s) below which the sensor tells nothing apart; 0 where it is negligible.
+        window: length of the filter (s); 0 for the recorded rate.
+        finest: smallest rate (rad/s) that the sensor resolves; 0 where it is negligible.
         blind: angle (rad) within which the sensor sees no motion: one count of an encoder, else 0.
-        sensor: `encoder`, or `gyro` for the difference of the load's and the hull's rate in space.
+        sensor: `encoder`, or `gyro` for the difference of the rates of load and hull in space.
     """
 
     values: Array
@@ -48,17 +48,17 @@ class RelativeRate:
 
 
 def slope(angle: Array, step: float, span: int) -> Array:
-    """Rate (rad/s) of an angle (rad): the slope of a line through `span` samples around each.
+    """Rate (rad/s) of an angle (rad): slope of a line through `span` samples around each sample.
 
     Args:
         angle: shape (n,).
         step: between samples (s).
         span: odd, at least 3.
 
-    Returns: shape (n,); NaN where the window reaches beyond the ends or over a lost sample.
+    Returns: shape (n,); NaN where the window exceeds the ends or includes a lost sample.
 
-    Its weights are odd about the middle (Savitzky and Golay, Analytical Chemistry 36 (1964) 1627,
-    of first and second order): no phase, and the exact rate of a parabola.
+    The weights are odd about the middle (Savitzky and Golay, Analytical Chemistry 36 (1964) 1627,
+    first and second order): zero phase shift, and the exact rate of a parabola.
     """
     half = span // 2
     places = np.arange(-half, half + 1)
@@ -66,12 +66,12 @@ def slope(angle: Array, step: float, span: int) -> Array:
 
 
 def mean(rate: Array, span: int) -> Array:
-    """Mean of `span` samples around each (odd), shape (n,); NaN as in `slope`."""
+    """Mean of `span` (odd) samples around each sample, shape (n,); NaN as in `slope`."""
     return _centred(rate, np.full(span, 1.0 / span))
 
 
 def _centred(samples: Array, weights: Array) -> Array:
-    """Convolution with odd many weights; NaN where not all of them meet a sample."""
+    """Convolution with an odd number of weights; NaN where a sample is missing."""
     values = np.full(len(samples), np.nan)
     half = len(weights) // 2
     if len(samples) >= len(weights):
@@ -80,10 +80,10 @@ def _centred(samples: Array, weights: Array) -> Array:
 
 
 def window_for(count: float, noise: float, step: float, finest: float) -> int:
-    """Samples (odd) of a line whose slope is wrong by less than `finest` (rad/s), or 1 for none.
+    """Samples (odd) of a line whose slope error is below `finest` (rad/s); 1: no line needed.
 
-    A staircase is off its motion by half a count at most, which turns the line by `WORST_COUNT`
-    counts per window; white noise of n samples turns it by sqrt(12 / n^3) standard deviations.
+    A staircase deviates from its motion by at most half a count: `WORST_COUNT` counts per window
+    in the slope. White noise of n samples adds sqrt(12 / n^3) standard deviations per step.
 
     Args:
         count: one count of the angle (rad).
@@ -105,15 +105,15 @@ def relative_rate(
     finest: float,
     longest: float,
 ) -> RelativeRate:
-    """The relative rate by the sensor that shows `finest` (rad/s) within a window of `longest` (s).
+    """Relative rate by the sensor that resolves `finest` (rad/s) in a window of `longest` (s).
 
-    The encoder if it does; else the difference of the rates in space, if that does; else the
-    encoder over the longest window, as fine as it then is.
+    The order is: encoder; difference of the rates in space; if neither resolves `finest`, encoder
+    over the longest window with a coarser resolution.
 
     Args:
-        recorded: the relative rate as the rig tells it (rad/s), all of shape (n,).
-        angle: of the encoder (rad); None where it was not recorded.
-        gyro: rate of the load in space (rad/s); None where it was not recorded.
+        recorded: relative rate from the rig (rad/s); all arrays have shape (n,).
+        angle: of the encoder (rad); None if not recorded.
+        gyro: rate of the load in space (rad/s); None if not recorded.
         base: rate of the hull in space (rad/s).
         step: between samples (s).
     """
@@ -149,12 +149,12 @@ def resolved_rate(
     *,
     own_sensor: bool,
 ) -> RelativeRate:
-    """The rate of an axis whose hull rests, by the sensor that shows `finest` within the shortest
-    time; else by the one that comes nearest to it.
+    """Rate of an axis with a hull at rest, by the sensor that resolves `finest` in the shortest
+    window, else by the sensor with the best resolution.
 
     Args:
-        rate, angle: rad/s, rad; shape (n,); `angle` None where nobody recorded it.
-        own_sensor: whether the rate has a sensor of its own, and is not made of the angle's counts.
+        rate, angle: rad/s, rad; shape (n,); `angle` is None if not recorded.
+        own_sensor: whether the rate has its own sensor, and is not made of the angle's counts.
         step, finest, longest: as for `relative_rate`.
     """
     still = np.zeros_like(rate)
@@ -168,16 +168,16 @@ def resolved_rate(
 
 
 def stop_rate(sliding: float, count: float) -> float:
-    """Rate (rad/s) that ends a torque ramp, by what counts as sliding and one count of the rate."""
+    """Rate (rad/s) that ends a torque ramp, from the threshold of sliding and one count."""
     return max(STOP_FACTOR * sliding, STOP_COUNTS * count)
 
 
 def slides_from(rate: Array, threshold: float) -> tuple[int, int] | None:
-    """First sample of sliding and the stop of what shows it; None where the load never slides.
+    """First sample and stop of the samples that show sliding; None where the load never slides.
 
-    It slides once its rate, shape (n,), either way, stays at `threshold` (rad/s) or above until it
-    is `STOP_FACTOR` times as fast or the recording ends. What creeps, or scatters, comes back. NaN
-    is neither.
+    Sliding begins where the magnitude of the rate, shape (n,), stays at `threshold` (rad/s) or
+    above until it exceeds `STOP_FACTOR` times that or the recording ends. Creep and noise fall
+    below it again. NaN has no influence.
     """
     size = np.abs(rate)
     fast = np.flatnonzero(size > STOP_FACTOR * threshold)
@@ -188,18 +188,18 @@ def slides_from(rate: Array, threshold: float) -> tuple[int, int] | None:
 
 
 def made_of_counts(rate: Array, angle: Array, step: float) -> bool:
-    """Whether one count of a rate (rad/s) is as large as a count of the angle (rad) per sample."""
+    """Whether one count of a rate (rad/s) exceeds half a count of the angle (rad) per sample."""
     return 2.0 * count_of(rate) * step > count_of(angle) > 0.0
 
 
 def _resolution(samples: Array) -> tuple[float, float]:
-    """One count and the noise of what was recorded, without lost samples."""
+    """One count and the noise of a recorded channel, without lost samples."""
     known = samples[np.isfinite(samples)]
     return count_of(known), noise_of(known)
 
 
 def _mean_of(count: float, noise: float, finest: float) -> int:
-    """Samples (odd) whose mean tells `finest` apart, where their errors are independent."""
+    """Samples (odd) whose mean resolves `finest`, for independent errors."""
     return _odd((max(count, SIGMAS * noise) / finest) ** 2)
 
 

@@ -126,16 +126,17 @@ def _noise(rest: Array) -> tuple[float, float]:
     square = float(left @ left)
     if square == 0.0:
         return 0.0, 1.0
-    alike = float(left[1:] @ left[:-1]) / square
-    alike += (1.0 + 4.0 * max(alike, 0.0)) / len(rest)  # residuals are less correlated than noise
-    alike = min(max(alike, 0.0), 0.95)
-    return math.sqrt(square / (len(rest) - 2)), math.sqrt((1.0 + alike) / (1.0 - alike))
+    correlation = float(left[1:] @ left[:-1]) / square
+    # Residuals are less correlated than noise.
+    correlation += (1.0 + 4.0 * max(correlation, 0.0)) / len(rest)
+    correlation = min(max(correlation, 0.0), 0.95)
+    return math.sqrt(square / (len(rest) - 2)), math.sqrt((1.0 + correlation) / (1.0 - correlation))
 
 
 def _parabolas(time: Array, share: Array, at: Array, half: float) -> tuple[Array, Array]:
-    """Value at each time `at` of the parabola through the samples within `half` (s) of it.
+    """Values at the times `at` of parabolas through the samples within `half` (s) of each.
 
-    And its standard error over that of a sample; both (m,), NaN for too few samples.
+    The second array has their standard errors over that of a sample; both (m,), NaN for too few.
     """
     value, weight = np.full(len(at), np.nan), np.full(len(at), np.nan)
     first = np.searchsorted(time, at - half)

@@ -64,7 +64,7 @@ def unsteady(
     *,
     own_sensor: bool = True,
 ) -> Reason:
-    """Why a window is no steady sliding, from its samples; `NONE` if they show no reason.
+    """Reason why a window is not steady sliding, from its samples; `NONE` without one.
 
     Args:
         time, rate: s, rad/s; shape (n,), n at least 3, without missing samples.
@@ -121,7 +121,7 @@ def seen_rate(
 def drifting(
     change: float, half_width: float, mean: float, commanded: float | None = None
 ) -> Reason:
-    """Why a mean rate is none of steady sliding: its change, its interval, or its command.
+    """Reason why a mean rate is not that of steady sliding: its change, interval or command.
 
     All in one unit; `half_width` is NaN without an interval. A stuck load creeps at a rate that
     differs from the `commanded` one (None: unknown).

@@ -100,7 +100,7 @@ def steady_sliding(
     trouble = unsteady(time, rate, angle, own_sensor=own_sensor) or trouble
     # In a window shorter than a known ripple, a change is due to position.
     short = periods is not None and columns is None
-    judged = trouble, NONE if short else torque_drift(torque, columns)
+    reasons = trouble, NONE if short else torque_drift(torque, columns)
     of_torque = of_series("friction_torque", noise, "N m")
     mean = _over_the_way(time, rate, torque, angle, own_sensor) - (inertia or 0.0) * slope
     spread = float(np.std(torque))
@@ -109,12 +109,12 @@ def steady_sliding(
     error = of_torque.standard_error
     if error is None:
         friction = Estimate.without_interval("friction_torque", mean, "N m", of_torque.reason)
-        return SteadySliding(of_rate, friction, spread, slope, 1.0, first, last, *judged)
+        return SteadySliding(of_rate, friction, spread, slope, 1.0, first, last, *reasons)
     both = math.hypot(error, (inertia or 0.0) * of_slope)
     method = METHOD if inertia is not None else WITHOUT_INERTIA
     friction = with_error("friction_torque", mean, "N m", both, BATCHES - 1, method)
     effective = (float(np.std(noise)) / both) ** 2 if both > 0 else float(len(time))
-    return SteadySliding(of_rate, friction, spread, slope, effective, first, last, *judged)
+    return SteadySliding(of_rate, friction, spread, slope, effective, first, last, *reasons)
 
 
 def _over_the_way(

@@ -32,13 +32,13 @@ SYMBOLS = {
     "stribeck_exponent": "δ",
 }
 EXPONENTS = (0.2, 5.0)
-"""Between which delta is sought."""
+"""Range of the search for delta."""
 BEYOND = 10.0
-"""How far beyond the slowest and the fastest speed vs is sought, as a factor."""
+"""Range of the search for vs: a factor beyond the slowest and the fastest speed."""
 STARTS = (24, (0.4, 0.7, 1.0, 1.5, 2.2, 3.3))
-"""Grid of starts: how many values of vs, and which of delta."""
+"""Grid of starts: number of values of vs, and values of delta."""
 TRIED = 2
-"""Best points of that grid from which a minimum is sought."""
+"""Number of best points of that grid that start a search."""
 
 
 def stribeck(speed: Array, values: Mapping[str, float]) -> Array:
@@ -50,20 +50,19 @@ def stribeck(speed: Array, values: Mapping[str, float]) -> Array:
 
 @dataclass(frozen=True)
 class StribeckFit:
-    """Parameters that are closest to one direction of a map.
+    """Least-squares parameters of one direction of a map.
 
     Attributes:
-        values: all five, by name; for a fit without Stribeck effect Ts is Tc, and vs and delta are
-            those that the search began with and mean nothing.
-        free: names of those that were fitted, those that ended at a bound included: they are not
-            known there, and what is not known of them is in the others; rows of `influence`.
-        bounds: `lower` or `upper` by name of a parameter that ended where it may not go beyond.
-        open: names of those that the data do not determine at all.
-        influence: how the free ones would follow each torque if there were no bounds, H⁻¹JᵀW,
-            shape (k, n); H is JᵀWJ, unless `with_misfit` has put the curvature of the misfit into
-            it.
+        values: all five, by name (SI); without Stribeck effect Ts equals Tc, and vs and delta are
+            meaningless start values.
+        free: names of the fitted parameters, the rows of `influence`. They include those at a
+            bound, whose uncertainty contributes to that of the others.
+        bounds: `lower` or `upper`, by name of a parameter at a bound of the search.
+        open: names of parameters that the data do not determine at all.
+        influence: derivatives of the free parameters by each torque without bounds, H⁻¹JᵀW, shape
+            (k, n); H is JᵀWJ, to which `with_misfit` adds the curvature of the misfit.
         residuals: torque minus model (N m), shape (n,).
-        deviation: of each torque (N m, 1 sigma), by which it was weighted, shape (n,).
+        deviation: of each torque (N m, 1 sigma), for its weight, shape (n,).
     """
 
     values: Mapping[str, float]
@@ -86,31 +85,31 @@ class StribeckFit:
 
     @property
     def bic(self) -> float:
-        """Bayesian information criterion for Gaussian residuals of unknown size; lower is better.
+        """Bayesian information criterion, Gaussian residuals of unknown variance; lower is better.
 
-        To be compared between fits with the same deviations only.
+        Comparable only between fits with the same deviations.
         """
         n = len(self.residuals)
         mean_square = max(self.chi_square / n, np.finfo(float).tiny)
         return n * float(np.log(mean_square)) + len(self.free) * float(np.log(n))
 
     def variance(self, weights: Mapping[str, float]) -> float:
-        """Variance of a sum of parameters, each times its weight; what is not free has none."""
+        """Variance of a weighted sum of parameters; only free ones contribute."""
         w = np.array([weights.get(name, 0.0) for name in self.free])
         return float(w @ self.covariance @ w)
 
     @property
     def covariance(self) -> Array:
-        """Of the free parameters, shape (k, k); (JᵀWJ)⁻¹ where nothing is put in for a misfit."""
+        """Covariance of the free parameters, shape (k, k); (JᵀWJ)⁻¹ without `with_misfit`."""
         weighted = self.influence * self.deviation
         return np.asarray(weighted @ weighted.T)
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Torques with their deviations, and which parameters are held; numbers of order 1 inside.
+    """Torques with their deviations, and bounds of the parameters: equal for one that is held.
 
-    The vector is (sigma2 / a, Tc / b, Ts / b, ln vs, ln delta), shape (5,).
+    The vector (sigma2 / a, Tc / b, Ts / b, ln vs, ln delta), shape (5,), has numbers of order 1.
     """
 
     speed: Array
@@ -123,7 +122,7 @@ class Problem:
 
     @classmethod
     def of(cls, speed: Array, torque: Array, deviation: Array, exponent: float | None) -> Problem:
-        """The search for one direction of a map; `exponent` holds delta."""
+        """Problem of one direction of a map; `exponent` holds delta."""
         level = float(np.max(np.abs(torque)))
         delta = EXPONENTS if exponent is None else (exponent, exponent)
         lower = [0.0, 0.0, 0.0, np.log(float(speed.min()) / BEYOND), np.log(delta[0])]
@@ -133,7 +132,7 @@ class Problem:
 
     @cached_property
     def log_speed(self) -> Array:
-        """Its natural logarithm, shape (n,)."""
+        """Natural logarithm of the speed, shape (n,)."""
         return np.log(self.speed)
 
     @cached_property
@@ -143,11 +142,11 @@ class Problem:
 
     @cached_property
     def scale(self) -> Array:
-        """By which the linear elements of the vector are multiplied, shape (3,)."""
+        """Factors of the linear elements of the vector (SI), shape (3,)."""
         return np.array([self.slope, self.level, self.level])
 
     def __call__(self, vector: Array) -> tuple[Array, Array]:
-        """Weighted residuals (n,) and their Jacobian (n, 5), as `minimum` wants them."""
+        """Weighted residuals (n,) and their Jacobian (n, 5), for `minimum`."""
         viscous, coulomb, static = (vector[:3] * self.scale).tolist()
         delta = float(np.exp(vector[4]))
         power = np.exp(delta * (self.log_speed - vector[3]))
@@ -169,13 +168,13 @@ class Problem:
         return dict(zip(PARAMETERS, natural.tolist(), strict=True))
 
     def by_parameter(self, vector: Array) -> Array:
-        """By how much each parameter (SI) changes with its element of the vector, shape (5,)."""
+        """Derivative of each parameter (SI) by its element of the vector, shape (5,)."""
         return np.concatenate([self.scale, np.exp(vector[3:])])
 
     def starts(self) -> list[Array]:
-        """The best points of a grid of vs and delta: what is left is linear, and solved at once."""
+        """Best points of a grid of vs and delta, with the linear parameters solved for each."""
         count, exponents = STARTS
-        # Within the speeds that were run: beyond them the search may go, but does not begin.
+        # Within the measured speeds: a search may leave them, but does not start beyond them.
         velocities = np.linspace(np.log(self.speed.min()), np.log(self.speed.max()), count)
         shapes = np.unique(np.clip(np.log(exponents), self.lower[4], self.upper[4]))
         grid = np.stack(np.meshgrid(velocities, shapes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -201,15 +200,15 @@ def fit_stribeck(
     start: Mapping[str, float] | None = None,
     near: Mapping[str, float] | None = None,
 ) -> StribeckFit:
-    """Equation 4.6 fitted to one direction of a map.
+    """Fit Equation 4.6 to one direction of a map.
 
     Args:
         speed, torque: positive (rad/s, N m), shape (n,).
-        deviation: of the torques (N m, 1 sigma), shape (n,); absent: all the same.
-        exponent: holds delta there (2 for the LuGre model); None fits it too.
-        start: parameters near the solution, where they are known; else a grid is searched.
-        near: parameters that may be near it, from which the search is begun as well: those of the
-            free fit, where the exponent is held. The grid ends with the speeds that were run.
+        deviation: of the torques (N m, 1 sigma), shape (n,); default: all equal.
+        exponent: value of a held delta (2 for the LuGre model); None: delta is fitted.
+        start: parameters near the solution, if known; default: a grid is searched.
+        near: additional start that may be near the solution: the free fit, where the exponent is
+            held. The grid ends at the measured speeds.
 
     Raises ValueError for no more points than parameters.
     """
@@ -219,15 +218,15 @@ def fit_stribeck(
     starts = problem.starts() if start is None else [_vector(problem, start)]
     if near is not None:
         starts.append(np.clip(_vector(problem, near), problem.lower, problem.upper))
-    found = min(
+    best = min(
         (minimum(problem, each, problem.lower, problem.upper) for each in starts),
         key=lambda solution: solution.cost,
     )
-    return _told(problem, found)
+    return _told(problem, best)
 
 
 def fit_line(speed: Array, torque: Array, deviation: Array) -> StribeckFit:
-    """Coulomb and viscous friction alone, without a Stribeck effect; arguments as above."""
+    """Fit Coulomb and viscous friction without a Stribeck effect; see `fit_stribeck`."""
     refuse_too_few(len(speed), 2)
     problem = Problem.of(speed, torque, deviation, 1.0)
     start = np.array([0.0, 1.0, 1.0, problem.lower[3], 0.0])
@@ -238,9 +237,9 @@ def fit_line(speed: Array, torque: Array, deviation: Array) -> StribeckFit:
         residuals, jacobian = problem(vector)
         return residuals, np.stack([jacobian[:, 0], jacobian[:, 1] + jacobian[:, 2]], axis=1)
 
-    found = minimum(line, start[inner], problem.lower[inner], problem.upper[inner])
-    vector = np.concatenate([found.point, found.point[1:], start[3:]])
-    full = Minimum(vector, found.residuals, found.jacobian, found.held)
+    solution = minimum(line, start[inner], problem.lower[inner], problem.upper[inner])
+    vector = np.concatenate([solution.point, solution.point[1:], start[3:]])
+    full = Minimum(vector, solution.residuals, solution.jacobian, solution.held)
     return _told(problem, full, inner)
 
 
@@ -251,7 +250,7 @@ def held_at(
     problem = Problem.of(speed, torque, found.deviation, exponent)
     index = PARAMETERS.index(name)
     held = _vector(problem, {**found.values, name: value})[index]
-    held = np.clip(held, problem.lower[index], problem.upper[index])  # no fit looks beyond
+    held = np.clip(held, problem.lower[index], problem.upper[index])  # as every search
     lower, upper = problem.lower.copy(), problem.upper.copy()
     lower[index] = upper[index] = held
     start = _vector(problem, found.values)
@@ -259,11 +258,11 @@ def held_at(
 
 
 def with_misfit(found: StribeckFit, speed: Array, torque: Array) -> StribeckFit:
-    """The fit with the influence that each torque has where the curve does not fit the points.
+    """Fit with the influence of each torque for a curve that does not fit the points.
 
-    H is then all of the second derivative of half of chi-square, and the covariance H⁻¹JᵀWJH⁻¹
-    is that of the curve of this kind that is closest to the truth (White, "Maximum likelihood
-    estimation of misspecified models", Econometrica 50 (1982)).
+    H is then the whole second derivative of half of chi-square. The covariance H⁻¹JᵀWJH⁻¹ is that
+    of the curve of this kind closest to the truth (White, "Maximum likelihood estimation of
+    misspecified models", Econometrica 50 (1982)). Unchanged if H is not positive definite.
     """
     held = found.values["stribeck_exponent"]
     problem = Problem.of(speed, torque, found.deviation, held)
@@ -292,7 +291,7 @@ def _vector(problem: Problem, values: Mapping[str, float]) -> Array:
 
 
 def _told(problem: Problem, found: Minimum, fitted: NDArray[np.int64] | None = None) -> StribeckFit:
-    """A minimum in the parameters' own units; `fitted`: which elements of the vector it is of."""
+    """Fit (SI) from a minimum; `fitted`: elements of the vector in it, default: all not held."""
     point = found.point
     if fitted is None:
         fitted = np.flatnonzero(problem.lower < problem.upper)
@@ -300,7 +299,7 @@ def _told(problem: Problem, found: Minimum, fitted: NDArray[np.int64] | None = N
     else:
         jacobian, held = found.jacobian, found.held
     natural = jacobian / problem.by_parameter(point)[fitted]
-    # A parameter at its bound stays in: left out, the others would count it as known exactly.
+    # A parameter at its bound is included: otherwise it would count as exactly known.
     inverse, left_open = covariance(natural)
     names = np.array(PARAMETERS)
     bounds = {
