@@ -1,1 +1,1 @@
-"""Comparison of runs: different numbers, sizes of the differences, and their certainty."""
+"""Comparison of runs: numbers that differ, sizes of the differences, and their certainty."""

@@ -1,6 +1,6 @@
 """Differences between two runs besides their results: protocol, bench, backend, versions.
 
-Field by field, in display units. The cause of a declared difference is one of these, or the bench.
+Field by field, in display units. One of them, or the bench, causes a declared difference.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Change:
     """One field that differs.
 
     Attributes:
-        where: `run`, `backend`, `versions`, or a test's name, also with `: bench` or `: truth`.
-        path: dotted; for a protocol or a bench as in `--set`.
+        where: `run`, `backend`, `versions`, or name of a test, also with `: bench` or `: truth`.
+        path: dotted path; for a protocol or a bench as in `--set`.
     """
 
     where: str
@@ -39,7 +39,7 @@ class Change:
 
 
 def changes(reference: RunReader, other: RunReader, pairing: Pairing) -> tuple[Change, ...]:
-    """All differences; one that several tests share, e.g. of their bench, only for the first."""
+    """All differences; one common to several tests, e.g. of their bench, only for the first."""
     differences: dict[tuple[str, str, str], Change] = {}
     for change in (*_of_runs(reference, other), *_of_tests(reference, other, pairing)):
         part = change.where.partition(": ")[2] or change.where

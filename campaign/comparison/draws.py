@@ -11,11 +11,11 @@ from campaign.text import count
 from campaign.trial import Role, Trial
 
 SIMULATION = "simulation"
-"""Source whose samples follow from a trial's fingerprint; those of a rig never repeat."""
+"""Source whose samples a trial's fingerprint determines; samples of a rig never repeat."""
 
 
 def common_draws(pairing: Pairing) -> Iterator[str]:
-    """Sentences on identical trials, and on trials with only the seed in common."""
+    """Sentences on identical trials, and on trials that share only the seed."""
     own: list[Trial] = []
     others: list[Trial] = []
     for tested in pairing.tests:
@@ -43,5 +43,5 @@ def _measured(test: AnalysedTest) -> Iterator[Trial]:
 
 
 def _common(one: list[str] | list[int], other: list[str] | list[int]) -> int:
-    """Count of elements of one list with a partner of their own in the other."""
+    """Count of elements that have their own partner in the other list."""
     return (Counter[str | int](one) & Counter[str | int](other)).total()

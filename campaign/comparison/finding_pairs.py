@@ -1,4 +1,4 @@
-"""Pairs of findings of two runs, with difference and reason for no verdict."""
+"""Pairs of findings of two runs, with their difference and the reason for no verdict."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Pair(JudgedNumber):
     """A finding of the reference and the matching one of another run.
 
     Attributes:
-        test, other_test: their tests.
+        test, other_test: tests of the findings.
         display: unit for display.
     """
 
@@ -45,7 +45,7 @@ class Pair(JudgedNumber):
 def pairs_of(tested: PairedTest, shared: Collection[str] = ()) -> Iterator[Pair]:
     """Pairs of one test with their differences, before verdicts.
 
-    shared: sources of systematic parts that both runs share: `shared_sources`.
+    shared: sources of systematic parts that both runs share (`shared_sources`).
     """
     for one, another in tested.findings:
         pair = Pair.of(

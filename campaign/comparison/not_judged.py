@@ -1,7 +1,7 @@
 """Reasons why a difference of two findings with intervals is not judged.
 
-Some numbers follow from others of the same test: a changed error changes all of its ratios, and
-each ratio would be declared different.
+Some numbers follow from others of the same test: a changed error changes all its ratios, and each
+ratio would be declared different.
 
 The interval of a single trial does not include the scatter between trials.
 """
@@ -24,7 +24,7 @@ ONE_OF_ONE_TRIAL = Cause("one of one trial", f"{{side}} is of one trial: {REPEAT
 
 
 def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Finding]) -> Reason:
-    """Reason not to judge two findings that both have intervals; `NONE` to judge them.
+    """Reason not to judge two findings with intervals; `NONE` to judge them.
 
     sides, findings: of the reference and of the other run.
     """
@@ -37,7 +37,7 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
 
 
 def trials_behind(test: AnalysedTest, finding: Finding) -> int:
-    """Count of trials that the finding may use: those that its conditions do not exclude."""
+    """Count of completed measurements that the conditions of a finding do not exclude."""
     return sum(
         archived.is_completed_measurement and allow(finding.conditions, archived.trial.point)
         for archived in test.trials

@@ -11,7 +11,7 @@ from campaign.report.palette import OTHERS
 from campaign.result import Curve, Figure, Panel
 
 PARTS = 8
-"""Most panels of an overlay."""
+"""Largest number of panels of an overlay."""
 SAMPLES = 20_000
 """Samples above which a figure shows recordings and is not overlaid."""
 LOOKS = OTHERS[:2]
@@ -23,7 +23,7 @@ Letters = tuple[str, str]
 def overlays(
     reference: AnalysedTest, other: AnalysedTest, letters: Letters
 ) -> Iterator[Figure | str]:
-    """Overlays of the figures that both tests have; for an impossible one, a sentence why."""
+    """Overlays of the figures of both tests; a sentence with the reason if one is impossible."""
     others = {figure.key: figure for figure in other.result.figures}
     for figure in reference.result.figures:
         if figure.key in others:
@@ -49,13 +49,13 @@ def _overlay(one: Figure, other: Figure, letters: Letters) -> Figure | str:
         return f"“{one.title}” has too many curves to be laid over each other."
     across = one.across if len(panels) == len(one.panels) else 2
     caption = f"{' and '.join(letters)} over each other."
-    if one.caption == other.caption:  # else it is of one run
+    if one.caption == other.caption:  # a different caption is of one run only
         caption = f"{caption} {one.caption}"
     return replace(one, panels=tuple(panels), caption=caption, thesis=(), trials=(), across=across)
 
 
 def _both(one: Panel, other: Panel, letters: Letters, title: str | None = None) -> Panel:
-    """One panel with the curves of both, each run in its own look."""
+    """One panel with the curves of both runs, each in its own look."""
     curves = tuple(
         _renamed(curve, letter)
         for letter, panel in zip(letters, (one, other), strict=True)
@@ -66,7 +66,7 @@ def _both(one: Panel, other: Panel, letters: Letters, title: str | None = None) 
 
 
 def _parts(one: Panel, other: Panel) -> Iterator[tuple[Panel, Panel]]:
-    """Pairs of panels with the common curves, in order; each panel satisfies `_few`."""
+    """Pairs of panels with the common curves, in order; `_few` is true for each panel."""
     others = {_key(curve): curve for curve in other.curves}
     parts: list[list[Curve]] = []
     for curve in one.curves:
@@ -85,7 +85,7 @@ def _parts(one: Panel, other: Panel) -> Iterator[tuple[Panel, Panel]]:
 
 
 def _common(one: str, other: str) -> str:
-    """Common leading parts of two titles, split at commas: later parts may be results of a run."""
+    """Common leading parts of two titles, split at commas; later parts may be results of a run."""
     pieces = zip(one.split(", "), other.split(", "), strict=False)
     return ", ".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pieces))
 
@@ -108,13 +108,13 @@ def _fits(one: Panel, other: Panel) -> bool:
 
 
 def _few(panel: Panel) -> bool:
-    """Whether style alone distinguishes a run's curves: at most one curve of each style."""
+    """Whether style alone distinguishes a run's curves: each style occurs once at most."""
     styles = [curve.style for curve in panel.curves]
     return len(styles) == len(set(styles))
 
 
 def _renamed(curve: Curve, letter: str) -> Curve:
-    """A run's curve in the run's look, without its quantity: no published values beside it."""
+    """Curve in the look of its run; no quantity, so that it shows no published values."""
     label = f"{letter}: {_told(curve)}" if _told(curve) else letter
     return replace(curve, label=label, series=letter, quantity="")
 

@@ -37,9 +37,9 @@ from campaign.report.page.pieces import Files, FoldedSection, Items, Paragraph, 
 
 NAME = "comparison"
 UNTOLD = ("test", "quantity", "conditions", "p")
-"""Columns that only the table of all pairs has, not a test's own tables."""
+"""Columns of the table of all pairs that the tables of a test omit."""
 HEADLINES = 12
-"""Most declared differences that the page lists at the top."""
+"""Largest number of declared differences at the top of the page."""
 
 
 def write_comparison(
@@ -210,7 +210,7 @@ def _test(
 def _figures(
     tested: PairedTest, pairs: Sequence[Pair], letters: Letters, name: str, making: PageParts
 ) -> tuple[tuple[ShownFigure, ...], tuple[str, ...]]:
-    """Figures of the numbers side by side and of overlaid curves; reasons for missing overlays."""
+    """Figures of numbers side by side and of overlaid curves; reasons for missing overlays."""
     folder = making.folder
     figures = [
         making.attempt(

@@ -1,4 +1,4 @@
-"""Figures of pairs: changes in percent, and the numbers of both runs."""
+"""Figures of pairs: changes in percent, and numbers of both runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 PANELS = 6
-"""Most quantities of a test that one figure shows."""
+"""Largest number of quantities in one figure."""
 
 
 def with_names(pairs: Sequence[Pair]) -> list[tuple[Pair, str]]:
@@ -34,7 +34,7 @@ def with_names(pairs: Sequence[Pair]) -> list[tuple[Pair, str]]:
 
 
 def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
-    """Figure of both runs' numbers, one panel per quantity with several; None without any."""
+    """Figure of both runs' numbers, a panel per quantity with several pairs; None without any."""
     groups: dict[str, list[Pair]] = {}
     for pair in pairs:
         selected = pair.testable or not any(
@@ -56,7 +56,7 @@ def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
 
 
 def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
-    """Draw the numbers of one quantity, the reference's above the other's."""
+    """Draw the numbers of one quantity: for each pair the reference above the other run."""
     first = pairs[0]
     unit, names = first.display, row_names(pairs)
     common = {n: v for n, v in first.conditions.items() if n not in _varied(pairs)}
@@ -90,7 +90,7 @@ def _draw_number(ax: Axes, estimate: Estimate, look: Look, y: float, label: str)
 
 
 def row_names(pairs: Sequence[Pair]) -> list[str]:
-    """Conditions of each pair that vary within its test and quantity."""
+    """Text of the conditions of each pair that vary within its test and quantity."""
     groups: dict[tuple[str, str], list[Pair]] = {}
     for pair in pairs:
         groups.setdefault((pair.test.name, pair.quantity), []).append(pair)

@@ -1,4 +1,4 @@
-"""Comparison of runs with a first one, as data for page, table and terminal."""
+"""Comparison of runs with the first one, as data for page, table and terminal."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class Side:
 
     @property
     def damaged(self) -> tuple[Damage, ...]:
-        """Damage of the run that its reader and its analyses detected."""
+        """Damage of the run that its reader or its analyses detected."""
         return damage_of(self.run, self.tests)
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Reasons of its tests without a result."""
+        """Reasons for tests without a result."""
         return tuple(f"{self.letter}: {t.name}: {t.problem}" for t in self.tests if t.problem)
 
 
@@ -99,7 +99,7 @@ class Comparison:
 
     @property
     def title(self) -> str:
-        """Title: the runs' titles if these are unique, else their names."""
+        """Title with the runs' titles if they are unique, else with their names."""
         titles = [side.title for side in self.sides]
         names = [side.run.header.name for side in self.sides]
         reference, *others = titles if len(set(titles)) == len(titles) else names
@@ -107,7 +107,7 @@ class Comparison:
 
     @property
     def tested(self) -> int:
-        """Size of the family: all pairs of all runs that have a p value."""
+        """Size of the family: pairs of all runs that have a p value."""
         return sum(each.tested for each in self.against)
 
 
@@ -117,7 +117,7 @@ def _same(one: Estimate, other: Estimate) -> bool:
 
 
 def size_of(pair: Pair) -> float:
-    """Sort key: size of the relative change; infinite if that is not defined."""
+    """Sort key: size of the relative change; infinite if undefined."""
     share = abs(pair.found.change.value)
     return math.inf if math.isnan(share) else share
 
@@ -130,7 +130,7 @@ def compare_runs(
     """Analyze the runs and compare each with the first.
 
     exchanged: sources of systematic parts that differ between runs although all benches state the
-        same value, e.g. of an exchanged motor.
+        same value, e.g. after the exchange of a motor.
 
     Raises UsageError for fewer than two runs, a repeated run, and runs without common findings.
     """
@@ -147,7 +147,7 @@ def compare_runs(
 
 
 def _exchanged(reference: Side, name: str) -> str:
-    """Source of this name. Raises UsageError for an unknown one."""
+    """Source of this name; raises UsageError if unknown."""
     axis = next((test.sides for test in reference.tests if test.bench), BOTH_ROTARY)
     source = source_called(name, SOURCES.values(), axis)
     if source is None:
@@ -198,7 +198,7 @@ def _against(reference: Side, other: Side, exchanged: Sequence[str]) -> Against:
 
 
 def _nothing_common(reference: Side, other: Side) -> Iterator[str]:
-    """Lines on why two runs cannot be compared, with tests and quantities of each."""
+    """Lines with the reason for no comparison, and with tests and quantities of each run."""
     yield (
         f"{reference.run.name} and {other.run.name} have no finding in common: none is of the same "
         "quantity under the same conditions"

@@ -1,7 +1,7 @@
 """Matching findings of two runs by quantity and conditions.
 
-Only tests of the same kind match: first those of the same name, then, of the others, those with the
-most findings in common. Tests and findings without a partner are kept and reported.
+Only tests of the same kind match: first those of the same name, then those with the most findings
+in common. Tests and findings without a partner are kept and reported.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from campaign.units import same_dimension
 
 @dataclass(frozen=True)
 class PairedTest:
-    """A test of the reference and the matching one of another run.
+    """A test of the reference and the matching test of another run.
 
     Attributes:
         findings: (reference, other), in the reference's order.
@@ -58,7 +58,7 @@ def pair_tests(reference: Sequence[AnalysedTest], other: Sequence[AnalysedTest])
 def pair_findings(
     reference: Iterable[Finding], other: Iterable[Finding]
 ) -> tuple[list[tuple[Finding, Finding]], list[Finding], list[Finding]]:
-    """Match findings, each once, in order: pairs, and the findings left over on both sides."""
+    """Match findings, each once, in order: pairs, and findings of either side without a partner."""
     pairs: list[tuple[Finding, Finding]] = []
     alone: list[Finding] = []
     others = list(other)
@@ -87,7 +87,7 @@ def same_finding(one: Finding, other: Finding) -> bool:
 def _candidates(
     reference: Sequence[AnalysedTest], other: Sequence[AnalysedTest], *, same_name: bool
 ) -> Iterator[tuple[int, int, int]]:
-    """Tests that may match: (less is better, index in the reference, index in the other)."""
+    """Tests that may match: (cost, index in the reference, index in the other)."""
     for i, one in enumerate(reference):
         for j, another in enumerate(other):
             if one.kind != another.kind or (one.name == another.name) != same_name:
@@ -103,12 +103,12 @@ def _paired(reference: AnalysedTest, other: AnalysedTest) -> PairedTest:
 
 
 def _measured(test: AnalysedTest) -> Iterator[Finding]:
-    """Findings from recordings, without those recomputed from published values."""
+    """Findings from recordings; those recomputed from published values are excluded."""
     return (finding for finding in test.result.findings if not finding.recomputed)
 
 
 def _words(finding: Finding) -> Hashable:
-    """Quantity, names of conditions, and text values: equal for findings that match."""
+    """Quantity, names of conditions, and text values; they are equal for matching findings."""
     stated = _stated(finding.conditions)
     words = frozenset((name, value) for name, value in stated.items() if isinstance(value, str))
     return finding.quantity, frozenset(stated), words

@@ -2,9 +2,8 @@
 
 Only constants of the bench can be shared, e.g. torque constant and inertia. Conditions: both tests
 state the same value and uncertainty for a bench of the same name. Their samples are from the same
-kind of source. If a truth was simulated, its value is the same for both. All other parts
-(interpolation, resolution, windows ...) are errors of one evaluation. They are treated as
-independent and add in squares.
+kind of source. A simulated truth has the same value for both. All other parts (interpolation,
+resolution, windows ...) are errors of one evaluation. They are independent and add in squares.
 """
 
 from __future__ import annotations
@@ -20,20 +19,20 @@ from campaign.physics.truth import value_at
 from campaign.trial import Tree, canonical_json
 
 Plants = Mapping[str, Tree]
-"""Simulated truths in place of stated benches, by digest: `RunHeader.truth.plants`."""
+"""Simulated truths in place of stated benches, by digest (`RunHeader.truth.plants`)."""
 
 
 def shared_sources(
     one: AnalysedTest, other: AnalysedTest, plants: Plants, other_plants: Plants
 ) -> frozenset[str]:
     """Names of the sources of systematic parts that shift both tests' numbers equally."""
-    theirs = constants(other, other_plants)
+    other_constants = constants(other, other_plants)
     own = constants(one, plants).items()
-    return frozenset(source for source, text in own if theirs.get(source) == text)
+    return frozenset(source for source, text in own if other_constants.get(source) == text)
 
 
 def constants(test: AnalysedTest, plants: Plants) -> Mapping[str, str]:
-    """Constants of a test by the name of their systematic part; equal texts mean equal constants.
+    """Constants of a test by the name of their systematic part; equal text, equal constant.
 
     Empty for a test whose bench or source of samples is unknown.
     """
@@ -47,7 +46,7 @@ def constants(test: AnalysedTest, plants: Plants) -> Mapping[str, str]:
 
 
 def source_called(name: str, sources: Iterable[str], sides: Sides) -> str | None:
-    """Source by its name, or by its name in terms of the axis; None if unknown."""
+    """Source with this name, possibly in terms of the axis; None if unknown."""
     return next((each for each in sources if name in (each, in_axis_terms(each, sides))), None)
 
 

@@ -1,4 +1,4 @@
-"""Tables and texts of pairs: for the page, CSV and terminal."""
+"""Tables and texts of pairs for page, CSV and terminal."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def shorter(table: Table, *names: str) -> Table:
 
 
 def alone_table(against: Against) -> Table | None:
-    """Table of findings in only one of the runs; None without any."""
+    """Table of findings that only one run has; None without any."""
     rows: list[Mapping[str, Cell]] = []
     reference, other = against.reference.letter, against.other.letter
     for tested in against.pairing.tests:
@@ -81,7 +81,7 @@ def alone_table(against: Against) -> Table | None:
 
 
 def changes_table(changes: Sequence[Change], letters: tuple[str, str]) -> Table:
-    """Table of the differences besides the results, one row per field."""
+    """Table of the differences other than results, one row per field."""
     return Table(
         "circumstances",
         "What differs between the runs besides",
@@ -128,7 +128,7 @@ def number_of(estimate: Estimate, unit: str) -> str:
 def change_of(pair: Pair) -> str:
     """Text of a change: `+10.0 % (8.9 to 11.1 %)`, a bound, or `–` for none.
 
-    If a relative change is not defined, the difference in its own unit.
+    If the relative change is undefined: the difference in its unit.
     """
     change = pair.found.change
     value, low, high = (
@@ -169,8 +169,8 @@ def sentences(against: Against, tested: int) -> Iterator[str]:
     yield from common_draws(against.pairing)
     if against.equal:
         return
-    found = count(len(pairs), "number is", "numbers are")
-    yield f"{found} found in both runs, {judged} of which can be tested."
+    common = count(len(pairs), "number is", "numbers are")
+    yield f"{common} found in both runs, {judged} of which can be tested."
     different = len(against.of(Verdict.DIFFERENT))
     if different:
         numbers = count(different, "is", "are")

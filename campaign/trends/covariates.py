@@ -1,4 +1,4 @@
-"""Covariates of trends: time, order, temperature, a tag, another number."""
+"""Covariates of trends: time, order, temperature, a tag, or another number."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class Covariate:
     """Independent variable of trends.
 
     Attributes:
-        label: at an axis.
+        label: text at an axis.
         unit: of its values.
-        per: unit of an effect: per `month`, `K`.
+        per: unit of an effect, such as `month` or `K`.
         step: `per` in `unit`.
-        ordered: whether numbers can jump along it.
+        ordered: whether it orders the runs, so that numbers can jump.
         at: its value for a test of a run ("": for the whole run); NaN if unknown.
-        of: its series, if it is a number of the runs.
+        of: series of the covariate, if it is a number of the runs.
     """
 
     name: str
@@ -70,7 +70,7 @@ def _time(members: Sequence[Member]) -> Covariate:
     if members[-1].created == first:
         raise UsageError("all runs began at the same time; `--over order` takes them as they come")
     days = {m.number: (m.created - first).total_seconds() / DAY for m in members}
-    # A drift per month is no useful unit for runs within days.
+    # For runs within days, a drift per month is not a useful unit.
     last = days[members[-1].number]
     per, step = ("month", MONTH) if last > 14 else ("day", 1.0) if last > 0.5 else ("h", 1 / 24)
     label, unit, size = ("Time since", "d", 1.0) if last > 0.5 else ("Time since", "h", 24.0)
@@ -103,9 +103,10 @@ def _temperature(members: Sequence[Member]) -> Covariate:
 
 
 def _measured_temperature(member: Member, test: str) -> float:
-    """degC: median over the test's trials of their medians, else the tag; NaN if unknown.
+    """Temperature (degC): median of the trials' medians, else the tag; NaN if unknown.
 
-    Raises ArchiveError for damaged temperatures; trials that the analyses left out do not count.
+    Trials that the analyses exclude do not count. Raises ArchiveError for damaged temperatures, and
+    UsageError for a tag with another unit than degC or K.
     """
     medians = []
     for each in (trial for one in member.tests for trial in one.trials):
@@ -168,7 +169,7 @@ def _tag(name: str, members: Sequence[Member]) -> Covariate:
 
 
 def _finding(over: str, members: Sequence[Member], series: Sequence[Series]) -> Covariate:
-    """Covariate from a number of the same runs, by its quantity or by unique words of its name."""
+    """Covariate from a number of the runs, by its quantity or by unique words of its name."""
     wanted = over.replace("_", " ").lower().split()
     named = [s for s in series if s.quantity == over]
     matches = named or [
@@ -216,7 +217,7 @@ def _of_series(one: Series) -> Covariate:
 
 
 def together(members: Sequence[Member], one: Covariate, other: Covariate) -> float:
-    """Correlation of two covariates over the runs; NaN if constant or known in fewer than three."""
+    """Correlation of two covariates over runs; NaN if constant or known in fewer than three."""
     pairs: Mapping[int, tuple[float, float]] = {
         m.number: (one.at(m, ""), other.at(m, "")) for m in members
     }

@@ -16,11 +16,11 @@ from campaign.trends.covariates import Covariate
 from campaign.trends.rig_trends import Trends, TrendSeries, Verdict
 
 ALONG = 25
-"""Points of a line and its band."""
+"""Number of points of a line and its band."""
 SMALL = 12
-"""Most small panels."""
+"""Largest number of small panels."""
 TITLE = 38
-"""Most characters of a small panel's title."""
+"""Largest number of characters in the title of a small panel."""
 
 
 def declared_figure(each: TrendSeries, trends: Trends, headline: str, place: int) -> Figure:

@@ -1,4 +1,4 @@
-"""Analyzed runs of one rig in order, and their differences."""
+"""Analyzed runs of one rig in order of time, and their differences."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 
 LEAST = 3
-"""Least number of runs; two can only be compared."""
+"""Fewest runs; two runs can only be compared."""
 LISTED = 6
-"""Most runs that a message names."""
+"""Largest number of runs in a message."""
 OWN_OF_EACH = ("operator", "machine", "status", "title", "seed")
-"""Differences between runs that explain no change of a number."""
+"""Differences between runs that cannot explain a change of a number."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class Member:
     """One of the runs.
 
     Attributes:
-        number: place in order of time, from 1.
-        tests: without figures, to save memory for many runs.
-        constants: constants of the bench by the name of their systematic part; the same text in
-            two runs means the same constant.
-        exchanged: systematic parts whose piece was exchanged before this run.
+        number: position in order of time, from 1.
+        tests: without figures, to save memory.
+        constants: constants of the bench by the name of their systematic part; runs with the same
+            text have the same constant.
+        exchanged: systematic parts of the pieces that were exchanged before this run.
     """
 
     number: int
@@ -54,22 +54,22 @@ class Member:
 
     @property
     def sides(self) -> Sides:
-        """Kinds of motion of the rig, for its terms."""
+        """Kinds of motion of the rig, which determine its terms."""
         return next((test.sides for test in self.tests if test.bench), BOTH_ROTARY)
 
     @property
     def damaged(self) -> tuple[Damage, ...]:
-        """Damage of the run that was detected."""
+        """Detected damage of the run."""
         return damage_of(self.run, self.tests)
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Reasons of its tests without a result."""
+        """Reasons for tests without a result."""
         return tuple(f"{self.name}: {t.name}: {t.problem}" for t in self.tests if t.problem)
 
     @cached_property
     def identical(self) -> Mapping[str, tuple[str, ...]]:
-        """Fingerprints of simulated trials by test: equal ones mean equal samples."""
+        """Fingerprints of simulated trials by test; equal fingerprints mean equal samples."""
         return {test.name: prints for test in self.tests if (prints := _fingerprints(test))}
 
 
@@ -78,7 +78,7 @@ def members_of(
 ) -> tuple[Member, ...]:
     """Analyze the runs, in order of their start.
 
-    Raises UsageError for fewer than three runs, for a run named twice, and for several rigs.
+    Raises UsageError for fewer than three runs, a repeated run, and several rigs.
     """
     _check(runs)
     begun = sorted(runs, key=lambda run: (_begun(run), run.name))
@@ -91,10 +91,10 @@ def with_exchanged(
 ) -> tuple[Member, ...]:
     """Mark the constants of exchanged pieces, which no bench file states.
 
-    exchanged: systematic parts, each with the path of the first run with the new piece. Runs
-        before and after do not share the error of the piece.
+    exchanged: systematic parts, each with the path of the first run with the new piece. Earlier
+        and later runs do not share the error of the piece.
 
-    Raises UsageError for an unknown constant, an unknown run, and the first run.
+    Raises UsageError for an unknown constant, an unknown run, and the first of all runs.
     """
     for name, path in exchanged:
         text = f"--exchanged {name}@{path.stem}"
@@ -127,7 +127,7 @@ def _with_another(member: Member, source: str, first: int) -> Member:
 
 
 def changes_before(members: Sequence[Member]) -> tuple[tuple[Change, ...], ...]:
-    """Differences, without results, of each run but the first from the one before."""
+    """Differences, other than results, of each run from the previous run."""
     return tuple(
         tuple(
             change

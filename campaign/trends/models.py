@@ -19,7 +19,7 @@ class TrendFit:
     """Parameters of one method over the runs.
 
     Attributes:
-        problems: unusable runs, with the reason.
+        problems: unusable runs with reasons.
     """
 
     method: str
@@ -74,7 +74,7 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
 def _section(
     member: Member, known: Mapping[str, Experiment], name: str, first: Section | None
 ) -> tuple[str, Section | None]:
-    """Reason for no result, and a run's section; its structure is that of `first`, if any."""
+    """Reason for no result, and section of a run, with the structure of `first` if given."""
     trials = tuple(each for each in member.run.trials if each.is_completed_measurement)
     if not trials:
         return "no trial was completed", None

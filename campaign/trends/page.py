@@ -39,7 +39,7 @@ from campaign.trends.tables import (
 
 NAME = "trend"
 HEADLINES = 20
-"""Most declared numbers that the page lists at the top and draws."""
+"""Largest number of declared numbers that the page lists at the top and draws."""
 
 
 def write_trends(

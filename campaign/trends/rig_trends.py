@@ -1,4 +1,4 @@
-"""Drift, jumps and correlations of a rig's numbers: one family of decisions."""
+"""Drifts and jumps of a rig's numbers, as one family of decisions."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ class TrendSeries:
 
     Attributes:
         x: values of the covariate at its points, in the unit of the covariate.
-        change: None if not judged; `reason` then states why.
-        adjusted: p values adjusted for the family, by `trend` and `jump`, of the tested ones.
-        detectable: smallest effects that are declared with a probability of 80 %, by the same
-            names, in the unit of the series.
+        change: trend and jump; None if not judged, with `reason`.
+        adjusted: p values adjusted for the family, by `trend` and `jump` if tested.
+        detectable: smallest effects that are declared with a probability of 80 %, by `trend` and
+            `jump`, in the unit of the series.
         jumps: declared jumps, in order.
         cancelled: systematic parts that all points share.
         notes: limitations.
@@ -87,7 +87,7 @@ class TrendSeries:
 
     @property
     def jump(self) -> Jump | None:
-        """Most likely jump, declared or not; None if there was no search for one."""
+        """Most likely jump, declared or not; None without a search."""
         return None if self.change is None else self.change.jump
 
     @property
@@ -111,14 +111,14 @@ class TrendSeries:
 
     @property
     def share(self) -> float:
-        """One display unit relative to the size of the mean; NaN if the mean is too uncertain."""
+        """One display unit over the size of the mean; NaN if the mean is too uncertain."""
         mean = self.mean
         if not mean.half_width < TELLS_A_SHARE * abs(mean.value):
             return math.nan
         return 1.0 / abs(mean.value)
 
     def estimate(self, name: str, known: Mixture, unit: str, size: float = 1.0) -> Estimate:
-        """Estimate from a mixture in the unit of the series, times `size`, in the display unit."""
+        """Estimate, in the display unit, of `size` times a mixture in the unit of the series."""
         own = size * self.series.scale
         value, ends = known.value, known.interval(LEVEL)
         low, high = sorted(end * own for end in ends)
@@ -131,11 +131,11 @@ class Trends:
     """Trends of the common numbers of runs over a covariate.
 
     Attributes:
-        followed: declared numbers first.
+        followed: all numbers, the declared ones first.
         level: p value at which one more number would be declared.
-        circumstances: differences between each run and the one before.
+        circumstances: differences of each run from the previous run.
         fitted: parameters of the runs by method.
-        notes: on all numbers.
+        notes: limitations of all numbers.
     """
 
     members: tuple[Member, ...]
@@ -156,7 +156,7 @@ class Trends:
 
     @property
     def tested(self) -> int:
-        """Size of the family."""
+        """Size of the family: count of p values."""
         return sum(len(each.p) for each in self.followed)
 
     @property
@@ -177,7 +177,7 @@ def follow(
 
     Args:
         over: `time`, `order`, `temperature`, a tag with a number, or one of the numbers.
-        models: names in `known`; their parameters are included.
+        models: names in `known`, whose parameters are included.
         exchanged: pieces exchanged before a run (`with_exchanged`).
 
     Raises UsageError for unusable runs and unknown names.
@@ -228,7 +228,7 @@ def _followed(series: Series, covariate: Covariate) -> TrendSeries:
 
 
 def _judged(found: Sequence[TrendSeries], *, ordered: bool) -> tuple[list[TrendSeries], float]:
-    """Series with verdicts, and the level; all p values of trends and jumps are one family."""
+    """Series with verdicts, and level; all p values of trends and jumps are one family."""
     tested = [(i, name, p) for i, each in enumerate(found) for name, p in each.p.items()]
     ps = [p for _, _, p in tested]
     level = level_of(ps)
@@ -274,7 +274,7 @@ def _within(each: TrendSeries) -> bool:
 
 
 def _imported(members: Sequence[Member], covariate: Covariate) -> Iterator[str]:
-    """Note on imported runs, whose times are not those of the recordings."""
+    """Note on imported runs, because their times are not the times of the recordings."""
     imported = sum(each.run.header.source == "recording" for each in members)
     if covariate.name == TIME and imported:
         yield (

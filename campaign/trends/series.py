@@ -1,8 +1,8 @@
 """One number of a rig over its runs, with its uncertainty.
 
 Findings are paired as in `campaign compare`. An error that all runs share shifts all points
-equally. It neither causes nor hides a trend and is left out. If a constant of the bench was
-determined again between runs, its error is common to the points with the same value.
+equally. It neither causes nor hides a trend and is excluded. If a constant of the bench was
+determined again between runs, points with the same value share its error.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 TWIN = "the same simulation as"
 Seen = dict[tuple[str, tuple[str, ...]], Member]
-"""First run with simulated trials, by test and fingerprints."""
+"""First run with the same simulated trials, by test and their fingerprints."""
 TOO_FEW_RUNS = Cause("too few runs", "found in {runs} runs{lost}: three are the least")
 SAME_IN_ALL = Cause("same in all runs", "it is the same in all runs, to the last digit")
 
@@ -46,7 +46,7 @@ class Point:
 
     Attributes:
         member: the run.
-        test: its test; "" for the whole run.
+        test: test of the run; "" for the whole run.
         estimate: in the unit of its series.
     """
 
@@ -60,7 +60,7 @@ class Series:
     """One number over runs.
 
     Attributes:
-        test: name of the test, or of the method that identified it.
+        test: name of the test, or of the method that estimated the number.
         name: display name with the conditions.
         unit: SI, of all points.
         display: unit for display.
@@ -92,7 +92,7 @@ class Series:
 
     @property
     def bare(self) -> str:
-        """Text on points without an interval, by which all have equal weight; "" without any."""
+        """Text on points without an interval, as then all have equal weight; "" without any."""
         without = sum(_own(point.estimate) is None for point in self.points)
         if not without:
             return ""
@@ -103,7 +103,7 @@ class Series:
     def own(self) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
         """Covariance of the points' own errors (n, n), canceled sources, unknown sources.
 
-        Unknown sources are constants that differ between runs and have no stated uncertainty.
+        Unknown sources are constants that differ between runs, without a stated uncertainty.
         """
         covariance = np.diag(np.square(_own_errors([point.estimate for point in self.points])))
         cancelled, unknown = [], []
@@ -151,7 +151,7 @@ class Collected:
     Attributes:
         unit: of all points (SI).
         left_out: runs without a point, with the reason.
-        wrong: reasons of the numbers whose model the data contradict.
+        wrong: reasons for numbers with a model that the data contradict.
     """
 
     unit: str
@@ -160,7 +160,7 @@ class Collected:
     wrong: list[Reason] = field(default_factory=list)
 
     def add(self, member: Member, test: str, estimate: Estimate, why: str = "") -> None:
-        """Add a point, or to `left_out` why not: no finite value, a bound, given, or `why`."""
+        """Add a point, or a reason to `left_out`: no finite value, a bound, given, or `why`."""
         estimate = in_unit(estimate, self.unit)
         if not why and not math.isfinite(estimate.value):
             why = "not found"
@@ -176,7 +176,7 @@ class Collected:
             self.wrong.append(estimate.reason)
 
     def series(self, reason: Reason = NONE, **more: Any) -> Series:
-        """Create the series. `reason`: why no trend is estimated; by default from the points."""
+        """Create the series. `reason`: why no trend is estimated; default: from the points."""
         values = [point.estimate.value for point in self.points]
         if not reason and len(values) < LEAST:
             whys = (why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in self.left_out)
@@ -206,17 +206,16 @@ def _series(test: AnalysedTest, finding: Finding, collected: Collected) -> Serie
 
 
 def why_twin(seen: Seen, member: Member, prints: tuple[str, ...], test: str = "") -> str:
-    """Reason why a run is no new one: an earlier one has the same simulated trials; else "".
+    """Reason why a run is a duplicate: an earlier run has the same simulated trials; else "".
 
-    prints: fingerprints of its simulated trials of a test, seeds included. The run is added to
-    `seen`.
+    prints: fingerprints of its simulated trials, seeds included. Adds the run to `seen`.
     """
     first = seen.setdefault((test, prints), member) if prints else member
     return "" if first is member else f"{TWIN} {first.name}"
 
 
 def _own_errors(found: Sequence[Estimate]) -> Array:
-    """Standard deviations of the points' scatter, shape (n,); all zero if any is unknown."""
+    """Standard deviations of the points' scatter, shape (n,); all 0 if any is unknown."""
     known = [error for each in found if (error := _own(each)) is not None]
     if len(known) < len(found):
         return np.zeros(len(found))
@@ -229,7 +228,7 @@ def _own_errors(found: Sequence[Estimate]) -> Array:
 def _own(estimate: Estimate) -> float | None:
     """Standard deviation of a point's scatter; None if unknown.
 
-    Half of the interval over the normal quantile: larger for few repeats, as for Student's t.
+    Half-width of the interval over the normal quantile; larger for few repeats (Student's t).
     """
     low, high = estimate.low, estimate.high
     if low is None or high is None or estimate.kind == "quantile" or estimate.level != LEVEL:
@@ -242,6 +241,6 @@ def _sources(points: Sequence[Point]) -> Iterator[str]:
 
 
 def _size(estimate: Estimate, source: str) -> float:
-    """1 sigma of a source in one number; 0 without the source, NaN if unknown."""
+    """Standard uncertainty of a number by a source; 0 without the source, NaN if unknown."""
     own = [p.standard_uncertainty for p in estimate.systematic if p.source == source]
     return math.nan if None in own else math.hypot(*(size or 0.0 for size in own))

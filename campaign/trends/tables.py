@@ -19,7 +19,7 @@ from campaign.trends.rig_trends import JUMP, TREND, Trends, TrendSeries, Verdict
 
 MEAN_NEAR_ZERO = Cause("mean near zero", "the mean is too near 0, or too little known")
 CIRCUMSTANCES = 4
-"""Most changes beside a jump that a sentence names; the table has all."""
+"""Largest number of changes at a jump in a sentence; the table has all."""
 
 
 def followed_table(rows: Sequence[TrendSeries], covariate: Covariate) -> Table:
@@ -126,7 +126,7 @@ def points_table(trends: Trends) -> Table:
 
 
 def circumstances_table(trends: Trends) -> Table:
-    """Table of the differences between each run and the one before it."""
+    """Table of the differences of each run from the previous run."""
     columns = (
         Column("from", "Run"),
         Column("to", "and the next"),
@@ -175,7 +175,7 @@ def runs_table(trends: Trends) -> Table:
 
 
 def effect(each: TrendSeries, covariate: Covariate) -> tuple[Estimate, Estimate] | None:
-    """Trend per `covariate.per`, in the display unit and relative to the mean; None without one."""
+    """Trend per `covariate.per`, in the display unit and over the mean; None without a trend."""
     if each.trend is None:
         return None
     slope, size = each.trend.slope, covariate.step
@@ -186,7 +186,7 @@ def effect(each: TrendSeries, covariate: Covariate) -> tuple[Estimate, Estimate]
 
 
 def jump_of(each: TrendSeries, jump: Jump) -> tuple[Estimate, Estimate]:
-    """Jump in the display unit, and relative to the mean."""
+    """Jump in the display unit, and over the mean."""
     return (
         each.estimate("jump", jump.size, each.series.display),
         _shared(each, each.estimate("jump", jump.size, "")),
@@ -315,7 +315,7 @@ def detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | No
 
 
 def _shared(each: TrendSeries, estimate: Estimate) -> Estimate:
-    """Estimate relative to the mean; NaN if the mean may be 0."""
+    """Estimate over the mean; NaN if the mean is too uncertain."""
     share = each.share
     if not math.isfinite(share):
         return Estimate.without_interval(estimate.name, math.nan, "", MEAN_NEAR_ZERO())
@@ -360,7 +360,7 @@ def _before(each: TrendSeries, jumps: Sequence[Jump]) -> str:
 
 
 def _runs_around(each: TrendSeries, jump: Jump) -> tuple[int, int]:
-    """Numbers of the runs around a jump; its place is between them with 95 % of the weight."""
+    """Numbers of the runs around a jump, which include 95 % of the weight of its places."""
     points = each.series.points
     low, high = jump.between
     return points[low - 1].member.number, points[high].member.number

@@ -23,7 +23,7 @@ from campaign.signals import MultiSine
 PER_CYCLE = 64
 """Points per cycle of the highest harmonic, at which a series is evaluated."""
 STILL = 0.02
-"""Share of the largest rate below which samples do not count: friction there equals the force."""
+"""Share of the largest rate below which samples do not count, as friction equals the force."""
 POPULATION = 40
 """Number of series in the population of the search."""
 SCALES, CROSSED = (0.4, 0.9), 0.9
@@ -34,7 +34,7 @@ SCALES, CROSSED = (0.4, 0.9), 0.9
 class Room:
     """Largest magnitudes of a series; rad, rad/s, rad/s^2, or m for a linear axis.
 
-    angle: distance from the middle.
+    angle: largest distance from the middle.
     """
 
     angle: float
@@ -130,11 +130,11 @@ def best_series(
     """Series with the lowest condition number in a seeded search.
 
     Differential evolution (Storn and Price, J. Global Optim. 11 (1997) 341) from random series.
-    Rate and acceleration begin at zero, so that a bench at rest has no jerk.
+    Initial rate and acceleration are zero, so that a bench at rest has no jerk.
 
     Args:
         terms: names of the model's terms (`estimation.inverse.terms`).
-        middle: middle angle of the motion (rad): gravity depends on it.
+        middle: middle angle of the motion (rad), on which gravity depends.
 
     Raises ValueError for fewer than two harmonics, no room, an unknown term, and terms that no
     motion separates.

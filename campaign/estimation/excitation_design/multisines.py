@@ -13,9 +13,9 @@ from campaign.signals import MultiSine
 POINTS = 16
 """Points per cycle of the highest line."""
 CLIPPED = (0.75, 0.98)
-"""Clipping level over the peak of the signal, in the first and in the last round."""
+"""Clipping level over the peak of the signal, in the first and the last round."""
 BISECTIONS = 60
-"""Bisections of a search for a zero: they reduce the interval to 1e-18 of the first one."""
+"""Bisections in the search for a zero; they reduce the interval to 1e-18 of its size."""
 ROUNDS = 400
 """Rounds of the search for a low crest factor."""
 
@@ -25,9 +25,9 @@ def odd_multisine(grid: OddGrid, seed: int, draws: int, *, lowered: bool, order:
 
     Args:
         draws: number of sets of random phases; the one with the lowest crest factor is used.
-        lowered: whether a search then reduces the crest factor further (`low_crest`).
-        order: the signal begins at a zero of its `order`-th integral of zero mean: 0 for a rate,
-            which then begins at rest; 1 for a torque, so that a free load does not drift.
+        lowered: whether `low_crest` then reduces the crest factor further.
+        order: the signal begins at a zero of its `order`-th integral of zero mean. 0: a rate
+            begins at rest; 1: a free load under a torque does not drift.
     """
     signal = random_phases(grid, 1.0, seed, draws=draws)
     phases = np.array(signal.phases)
@@ -43,9 +43,9 @@ def odd_multisine(grid: OddGrid, seed: int, draws: int, *, lowered: bool, order:
 def low_crest(lines: Lines, phases: Array) -> Array:
     """Phases (rad) of sines of equal size with a lower crest factor, from start values (k,).
 
-    In each round the signal is clipped and only its phases are kept (Van der Ouderaa, Schoukens and
-    Renneboog, IEEE Trans. Instrum. Meas. 37 (1988) 145). Returns those of the best round. lines:
-    multiples of the base frequency, shape (k,).
+    Each round clips the signal and keeps only its phases (Van der Ouderaa, Schoukens and
+    Renneboog, IEEE Trans. Instrum. Meas. 37 (1988) 145). Returns the phases of the best round.
+    lines: multiples of the base frequency, shape (k,).
     """
     count = POINTS * int(lines[-1])
     best, lowest = phases, np.inf
@@ -61,7 +61,7 @@ def low_crest(lines: Lines, phases: Array) -> Array:
 
 
 def peak(signal: MultiSine, period: float) -> float:
-    """Largest magnitude of a multisine with a period (s), at 64 points of its fastest cycle."""
+    """Largest magnitude of a multisine with a period (s), at 64 points of the fastest cycle."""
     count = 4 * POINTS * round(max(signal.frequencies) * period)
     lines = np.round(np.array(signal.frequencies) * period).astype(int)
     phases = np.array(signal.phases)
@@ -75,7 +75,7 @@ def crest_factor(signal: MultiSine, period: float) -> float:
 
 
 def _shifted(lines: Lines, phases: Array, order: int) -> Array:
-    """Phases of the signal shifted in time to the first zero of its `order`-th integral."""
+    """Phases after a time shift to the first zero of the signal's `order`-th integral."""
     count = POINTS * int(lines[-1])
     signal = course(lines, phases, count, 1.0, order)
     size = 1.0 / lines.astype(float) ** order

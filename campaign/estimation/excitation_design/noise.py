@@ -14,11 +14,11 @@ def band_noise(
 ) -> Array:
     """Samples at `rate` (Hz), shape (duration * rate + 1,), with rms 1 and zero mean.
 
-    White Gaussian noise after an ideal band-pass without phase, by a Fourier transform of the whole
-    signal. The signal is periodic, so that the last sample is equal to the first; it begins at a
-    zero of its `order`-th integral.
+    White Gaussian noise after an ideal zero-phase band-pass, by a Fourier transform of the whole
+    signal. The signal is periodic: its last sample is equal to the first. It begins at a zero of
+    its `order`-th integral.
 
-    Raises ValueError where the band has fewer than two lines of the duration, or exceeds half the
+    Raises ValueError if the band has fewer than two lines of the duration, or exceeds half the
     rate.
     """
     count = round(duration * rate)
@@ -40,7 +40,7 @@ def band_noise(
     noise = np.fft.irfft(spectrum * np.exp(2j * np.pi * lines * turn), count)
     noise /= np.sqrt(np.mean(noise**2))
     if order == 0:
-        noise[0] = 0.0  # without the rounding error: a jump of a rate is an infinite acceleration
+        noise[0] = 0.0  # removes a rounding error: a jump of a rate is an infinite acceleration
     return np.append(noise, noise[0])
 
 

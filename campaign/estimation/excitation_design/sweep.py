@@ -12,7 +12,7 @@ from campaign.arrays import Array
 
 Law = Literal["linear", "logarithmic"]
 PER_CYCLE = 32
-"""Points per cycle: straight lines between them have an error of at most half a percent."""
+"""Points per cycle; straight lines between them have an error of at most 0.5 %."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Chirp:
 def chirp(lowest: float, highest: float, duration: float, law: Law) -> Chirp:
     """Sweep of about a duration (s), with a whole number of cycles, so that it ends at 0.
 
-    Raises ValueError where `highest` is not above `lowest`, and for less than a cycle.
+    Raises ValueError unless 0 < `lowest` < `highest`, and for half a cycle or less.
     """
     if not 0.0 < lowest < highest:
         raise ValueError("highest must be above lowest")

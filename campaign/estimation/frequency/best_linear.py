@@ -1,6 +1,6 @@
 """Best linear approximation from repeated multisines: the robust method.
 
-The scatter over realisations of the phases contains noise and nonlinear distortion; the scatter
+The scatter over realisations of the phases contains noise and nonlinear distortion. The scatter
 over periods contains only noise. Their comparison separates the two (Pintelon and Schoukens,
 "System Identification: A Frequency Domain Approach" (2012), 4.3). A best linear approximation
 applies to its excitation only. Therefore the result includes the rms, band and distribution.
@@ -20,11 +20,11 @@ from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.welch import NO_REFERENCE, Excited
 
 FEWEST_REALISATIONS = 7
-"""Least number for which their variance is a weight for a fit (Pintelon, Schoukens: 4.3.1)."""
+"""Least number of realisations whose variance can weight a fit (Pintelon, Schoukens: 4.3.1)."""
 
 
 NOTHING = 1e-9
-"""Share of the largest line below which there is no input at a line."""
+"""Share of the largest line below which a line has no input."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Excitation:
         rms: of the input without its mean, in its unit.
         lowest, highest: frequencies of the excited lines (Hz).
         lines: number of excited lines.
-        crest: largest value of the input over its rms, the mean over realisations.
-        odd: whether no line of even number is excited.
+        crest: largest value of the input over its rms, averaged over realisations.
+        odd: whether only lines of odd number are excited.
         unit: unit of the input, for display.
     """
 
@@ -65,8 +65,8 @@ class BestLinear:
     """Response at the excited lines, with noise and distortion of the output.
 
     Attributes:
-        response: its variance over realisations contains noise and stochastic nonlinear part;
-            with a single realisation only noise (see `undetermined`).
+        response: its variance over realisations contains noise and stochastic nonlinear part.
+            With a single realisation it contains only noise (see `undetermined`).
         noise: variance of the response by noise, shape (n,); NaN for a single period.
         distortion: output at the detection lines; None for a single period.
         undetermined: sentences on what this measurement does not determine, and why.
@@ -91,7 +91,7 @@ def best_linear(
     """Best linear approximation from whole periods of m realisations.
 
     The signals have the shape (m, periods * samples) at `rate` (Hz). The first period may contain
-    the transient: the lines between those of the period determine it.
+    the transient: the lines between the period's harmonics determine it.
 
     Args:
         excited: excited lines of the period, ascending, shape (k,).

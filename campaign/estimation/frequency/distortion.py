@@ -1,9 +1,9 @@
 """Even and odd distortion of the output at lines without excitation.
 
-The input of an amplifier or a loop at those lines is subtracted by the response there (Pintelon and
-Schoukens (2012), 4.3.2). Odd distortion is also at the excited lines, where it scatters over
-realisations. A single realisation does not show that scatter: then the omitted lines represent all
-lines, with an error of several dB where one mode has most of the power.
+An amplifier or a loop also causes input at those lines. Its effect, input times response, is
+subtracted (Pintelon and Schoukens (2012), 4.3.2). Odd distortion also occurs at the excited lines,
+where it scatters over realisations. A single realisation does not show that scatter: then the
+omitted lines represent all lines, with an error of several dB if one mode has most of the power.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class Distortion:
     Attributes:
         between: odd distortion at the excited lines, from the scatter over realisations; None for a
             single realisation.
-        mixed: whether even lines are also excited: then both parities have common lines.
+        mixed: whether even lines are also excited; then the parities share lines.
         output: squared rms of the output at all excited lines together, shape (m,).
         excited: mean squared rms of the output at each excited line, shape (k,).
     """
@@ -113,9 +113,9 @@ def detected(
     """Levels at the lines between the first and the last excited one.
 
     Args:
-        found: input and output are its first two signals.
+        found: its first two signals are input and output.
         covariance: of their noise, `found.noise`.
-        excited: lines, shape (k,); `values`: the response there, shape (k,).
+        excited: lines, shape (k,). values: response at these lines, shape (k,).
     """
     within = np.arange(excited[0] + 1, excited[-1], dtype=np.int64)
     odd = np.setdiff1d(within[within % 2 == 1], excited)
@@ -124,11 +124,11 @@ def detected(
     answered = 0.5 * np.abs(found.lines[1][:, excited - 1]) ** 2
 
     def level(lines: Lines, share: float, grown: float = 1.0) -> Level:
-        there = np.interp(lines, excited, values.real) + 1j * np.interp(lines, excited, values.imag)
-        left = found.lines[1][:, lines - 1] - there * found.lines[0][:, lines - 1]
-        row = np.stack([-there, np.ones_like(there)], axis=1)
+        gain = np.interp(lines, excited, values.real) + 1j * np.interp(lines, excited, values.imag)
+        rest = found.lines[1][:, lines - 1] - gain * found.lines[0][:, lines - 1]
+        row = np.stack([-gain, np.ones_like(gain)], axis=1)
         noise = np.einsum("ka,kab,kb->k", row, covariance[lines - 1, :2, :2], np.conj(row)).real
-        power = 0.5 * grown * np.abs(left) ** 2
+        power = 0.5 * grown * np.abs(rest) ** 2
         known = found.freedom, found.shared
         recorded = np.mean(0.5 * np.abs(found.lines[1][:, lines - 1]) ** 2, axis=0)
         return Level(found.frequency[lines - 1], power, 0.5 * noise, *known, share, recorded)
@@ -139,7 +139,7 @@ def detected(
         level(odd, len(odd) / max(all_odd, 1)),
         np.sum(answered, axis=1),
         np.mean(answered, axis=0),
-        # The response contains their mean.
+        # The response contains the mean distortion of the realisations.
         level(excited, 1.0, count / (count - 1)) if count > 1 else None,
         bool(np.any(excited % 2 == 0)),
     )
@@ -160,9 +160,9 @@ def _all_odd(distortion: Distortion) -> Level:
 
 
 def total(distortion: Distortion, parity: Parity) -> Estimate:
-    """Rms of all even or odd distortion in the band over that of the output, in the logarithm.
+    """Rms of all even or odd distortion in the band over rms of the output.
 
-    Where the interval of its power includes zero, it is an upper bound.
+    It is an upper bound if the interval of its power, or a realisation, is not above zero.
     """
     level = distortion.even if parity == "even" else _all_odd(distortion)
     name = f"{parity}_distortion"

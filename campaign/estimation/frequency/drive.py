@@ -36,20 +36,20 @@ class TwoMass:
     """Two-mass drive.
 
     Attributes:
-        estimates: by the names of `UNITS`; *not determined* where the responses do not determine
+        estimates: by the names of `UNITS`; *not determined* if the responses do not determine
             them. Resonance and antiresonance are undamped, sqrt(k (1/J1 + 1/J2)) and sqrt(k / J2)
             over 2 pi (Hz). `antiresonance_damping` is d / (2 sqrt(k J2)), `inertia_ratio` J2 / J1.
-        misfit: why such a drive is no model of the responses; `NONE` where it may be one.
+        misfit: why such a drive is no model of the responses; `NONE` if it may be one.
         excess: weighted square over its expectation for a correct model.
         criterion: Schwarz' (BIC).
         sides: the measured sides.
         point: parameters of `model` and a delay for each side, shape (p,).
-        function: the fitted function of a load alone or of one inertia, instead of `model`.
-        rigid: whether one inertia explains the responses, so that they show no second one.
-        grounded: whether a spring holds the motor, as friction does before it slides.
+        function: fitted in place of `model`, for a load alone or one inertia.
+        rigid: whether one inertia explains the responses; then they do not show a second one.
+        grounded: whether a spring holds the motor, as friction does before sliding.
         covariance: of `point` by scatter, shape (p, p).
-        correlations: of the estimates by scatter, by pairs of their names.
-        condition: number of the weighted Jacobian, its columns scaled to length 1.
+        correlations: of the estimates by scatter; keys are pairs of names.
+        condition: condition number of the weighted Jacobian with columns of length 1.
     """
 
     estimates: Mapping[str, Estimate]
@@ -73,7 +73,7 @@ class TwoMass:
         return model(frequency, self.point, side, self.delay(side))
 
     def delay(self, side: Side) -> float:
-        """Delay of the response of that side (s); zero for a side without a measurement."""
+        """Delay of the response of a side (s); zero for a side without a measurement."""
         if self.function is not None:
             return self.function.delay
         return float(self.point[7 + self.sides.index(side)]) if side in self.sides else 0.0

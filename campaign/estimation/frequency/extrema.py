@@ -1,8 +1,8 @@
 """Modes from the lines of a response without a fitted function.
 
-With few realisations the variance is no weight for a fit. But the response shows between which of
-its lines the gain has an extremum. The interval ends at the nearest lines with a gain that surely
-differs from that of the extremum, and so is never narrower than the spacing of the lines. It needs
+With few realisations the variance cannot weight a fit. But the response shows between which of
+its lines the gain has an extremum. The interval ends at the nearest lines whose gain differs
+significantly from that of the extremum. It is never narrower than the spacing of the lines, needs
 no model of the drive and has no standard error.
 """
 
@@ -24,8 +24,8 @@ PROMINENCE = 1.5
 SURELY = 2.0
 """Standard deviations of a difference of two gains above which they differ."""
 BESIDE = 1.1
-"""Ratio of gains within which the undamped frequency may differ from the extremum: damping with the
-ratio z shifts the extremum by about z², and this ratio is reached at a distance of z / 2."""
+"""Ratio of gains within which the undamped frequency may lie beside the extremum. A damping ratio z
+shifts the extremum by about z²; the gains have this ratio at a distance of z / 2."""
 TOGETHER = 3
 """Number of neighboring lines over which relative scatter is averaged."""
 METHOD = "extremum of the measured gain, between the nearest lines whose gain surely differs"
@@ -72,12 +72,12 @@ def relative_scatter(best: BestLinear) -> Array | None:
     square = np.mean(distortion.odd.power, axis=0) / beside / best.excitation.realisations
     around = np.pad(square, TOGETHER // 2, mode="edge")
     alike = np.convolve(around, np.full(TOGETHER, 1.0 / TOGETHER), "valid")
-    # One of the two parts of a complex error is an error of the logarithm of the gain.
+    # Only one of the two parts of a complex error changes the logarithm of the gain.
     return np.interp(best.response.frequency, distortion.odd.frequency, np.sqrt(0.5 * alike))
 
 
 def _extremum(level: Array, scatter: Array) -> tuple[int, int, int] | None:
-    """Most prominent maximum with the nearest surely lower lines: below, maximum, above."""
+    """Most prominent maximum and the nearest surely lower lines, as (below, maximum, above)."""
     from scipy.signal import find_peaks
 
     peaks, sizes = find_peaks(level, prominence=math.log(PROMINENCE))

@@ -1,8 +1,8 @@
 """Lines of periodic signals without transient and drift, with noise covariance.
 
 A record of P periods has P - 1 lines between two harmonics of its period. For any nonlinear system
-they contain only transient and noise. A transient is smooth over frequency: a polynomial through
-the lines around a harmonic estimates it there, and the residuals are noise (robust local polynomial
+they contain only transient and noise. The transient is smooth over frequency. A polynomial through
+the lines around a harmonic estimates it, and the residuals are noise (robust local polynomial
 method; Pintelon, Vandersteen, Schoukens and Rolain, Mech. Syst. Signal Process. 25 (2011) 2892;
 Pintelon and Schoukens (2012), 7.2).
 """
@@ -20,7 +20,7 @@ from campaign.arrays import Array, ComplexArray
 ORDER = 2
 """Order of the polynomial of the transient."""
 AROUND = 10
-"""Number of lines around a harmonic, without harmonics, that are fitted."""
+"""Number of fitted lines around a harmonic; harmonics are excluded."""
 REACH = 2 * AROUND
 """Largest distance of these lines from the harmonic, in lines."""
 
@@ -31,8 +31,8 @@ class LineSpectra:
 
     Attributes:
         frequency: of the lines (Hz), shape (n,).
-        lines: without transient, shape (c, m, n): a sine of amplitude a has |line| = a.
-        noise: covariance E[e e*] of `lines` in one realisation, shape (n, c, c), a mean over the
+        lines: without transient, shape (c, m, n); |line| is the amplitude of a sine.
+        noise: covariance E[e e*] of `lines` in one realisation, shape (n, c, c), averaged over the
             realisations; None for a single period.
         freedom: real degrees of freedom of `noise`.
         periods: of each realisation.
@@ -50,7 +50,7 @@ class LineSpectra:
         return max(1.0, AROUND / max(self.periods - 1, 1))
 
     def conjugated(self, phase: ComplexArray) -> LineSpectra:
-        """Rotate back by a phase for each realisation and line, |phase| = 1, shape (m, n)."""
+        """Rotate each line back by a phase factor of size 1, shape (m, n)."""
         turned = self.lines * np.conj(phase)
         return replace(self, lines=turned)
 
@@ -61,7 +61,7 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
     Args:
         highest: upper limit of the lines (Hz).
 
-    Raises ValueError where the length is no whole number of periods, or no line is below `highest`.
+    Raises ValueError for incomplete periods, samples not finite, and no line below `highest`.
     """
     total = signals.shape[-1]
     if periods < 1 or total % periods:
@@ -89,7 +89,7 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
         lines[..., k] -= fit[..., 0]
         left = around - fit @ basis.T
         spread = np.einsum("amj,bmj->ab", left, np.conj(left)) / (free * realisations)
-        # The subtracted transient adds its own noise, by `inverse`, to that of the line.
+        # The subtracted transient adds noise to that of the line, by `inverse`.
         noise[k] = spread * (1.0 + float(np.sum(inverse[0] ** 2)))
     return LineSpectra(frequency, lines, noise, 2.0 * free * realisations, periods)
 
@@ -98,8 +98,8 @@ def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> L
 def _fitted_around(below: int, periods: int, above: int) -> tuple[NDArray[np.intp], Array, Array]:
     """Distances of the fitted lines from a harmonic; basis and its inverse.
 
-    The nearest lines without harmonics and without the mean, which is `below` lines lower, within
-    the spectrum, which ends `above` lines higher.
+    These are the nearest lines except harmonics. The mean is `below` lines lower and excluded; the
+    spectrum ends `above` lines higher.
     """
     away = np.arange(max(1 - below, -REACH), min(above, REACH + 1))
     away = away[away % periods != 0]

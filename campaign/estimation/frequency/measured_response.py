@@ -14,7 +14,7 @@ from campaign.estimation.intervals import student
 ALIKE = 8.0
 """Number of neighbors with a common bias: the factor of its square in the variance of a fit."""
 LEAST_FREEDOM = 5.0
-"""Least degrees of freedom of a variance for a weight, which needs more than 4."""
+"""Least degrees of freedom of a variance that is a weight; more than 4 are necessary."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class MeasuredResponse:
     Attributes:
         frequency: ascending (Hz), shape (n,).
         values: complex, in the output's unit over the input's, shape (n,).
-        variance: E|error|² of each value by scatter: both parts together, shape (n,).
-        freedom: real degrees of freedom of `variance`, shape (n,); infinite for an exact one.
+        variance: E|error|² of each value by scatter, real and imaginary part together, shape (n,).
+        freedom: real degrees of freedom of `variance`, shape (n,); infinite if it is exact.
         coherence: share of the output's power that the excitation explains, shape (n,).
-        bias: possible error by the method, such as by a window at a sharp mode: 1 sigma, size of a
-            complex error, shape (n,).
+        bias: possible error of the method, such as of a window at a sharp mode: size of a complex
+            error (1 sigma), shape (n,).
         method: description of the method.
     """
 
@@ -42,7 +42,7 @@ class MeasuredResponse:
 
     @staticmethod
     def of(response: Response, method: str = "sine by sine") -> MeasuredResponse:
-        """Response measured sine by sine; its errors count as exact."""
+        """Response measured sine by sine; its variances count as exact."""
         n = len(response.frequency)
         return MeasuredResponse(
             response.frequency,

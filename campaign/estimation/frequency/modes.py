@@ -16,7 +16,7 @@ from campaign.estimation.intervals import MODEL_MISFIT, with_error
 from campaign.reason import Cause, Reason
 
 LEAST_IMAGINARY = 1e-6
-"""Share of a root below which its imaginary part counts as rounding."""
+"""Share of a root's size below which its imaginary part is a rounding error."""
 SAME = 0.1
 """Distance in the logarithm of frequency within which modes of two orders are the same."""
 METHOD = "root of a rational function with a delay, delta method"
@@ -62,7 +62,7 @@ def modes(fit: RationalFit) -> tuple[Mode, ...]:
 def chosen_modes(chosen: ChosenOrder) -> tuple[Mode, ...]:
     """Modes of the chosen order, with the difference to other likely orders as a systematic part.
 
-    The nearest mode of another order counts, if it is within `SAME`.
+    The nearest mode of each other order is used, if its distance is below `SAME`.
     """
     others = [modes(each) for each in chosen.near]
 
@@ -117,9 +117,9 @@ def _mode(
 def of_fit(
     name: str, value: float, unit: str, error: float, misfit: Reason, method: str
 ) -> Estimate:
-    """Estimate from a fit; without an interval for a misfit, or at a bound.
+    """Estimate from a fit; it has no interval for a misfit, or at a bound.
 
-    A value is at its bound where its standard error is 0: no parameter changes it.
+    A value with a standard error of 0 is at its bound: no parameter changes it.
     """
     if misfit:
         return Estimate.without_interval(name, value, unit, MODEL_MISFIT(why=misfit), method=method)

@@ -1,9 +1,9 @@
 """Odd random-phase multisines: response, noise and distortion at once.
 
-Only odd lines of the base frequency are excited. In each group of a few lines one, drawn at random,
-is omitted. The output at omitted lines is odd distortion, at even lines even distortion. Phases are
-independent and uniform, so that a mean over realisations reduces the rest (Pintelon and Schoukens,
-"System Identification: A Frequency Domain Approach" (2012), 3.5 and 4.3).
+Only odd lines of the base frequency are excited. Each group of a few lines omits one, drawn at
+random. The output at omitted lines is odd distortion, at even lines even distortion. Phases are
+independent and uniform. Therefore a mean over realisations reduces the rest (Pintelon and
+Schoukens, "System Identification: A Frequency Domain Approach" (2012), 3.5 and 4.3).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from campaign.signals import MultiSine
 
 Lines = NDArray[np.int64]
 CREST_SAMPLES = 8
-"""Samples of a period over the highest line, for the crest factor."""
+"""Samples per cycle of the highest line, for the crest factor."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ class OddGrid:
 
 
 def odd_grid(lowest: float, highest: float, period: float, seed: int, group: int = 3) -> OddGrid:
-    """Odd lines from `lowest` to `highest` (Hz), without a random one of every `group` lines.
+    """Odd lines from `lowest` to `highest` (Hz); one random line of each `group` is omitted.
 
     The first and the last line are always kept. Raises ValueError for fewer than three groups, or
-    for groups of one.
+    for groups of one line.
     """
     if group < 2:
         raise ValueError("a group has at least two lines: one is left out")
@@ -68,9 +68,9 @@ def odd_grid(lowest: float, highest: float, period: float, seed: int, group: int
 def random_phases(grid: OddGrid, rms: float, seed: int, draws: int = 1) -> MultiSine:
     """One realisation: sines of equal amplitude and uniform random phases, with a total `rms`.
 
-    rms: in the unit of the input. draws: number of draws, of which the one with the lowest crest
-        factor is kept. With a few tens of draws the phases still count as random; a search would
-        make them dependent.
+    rms: in the unit of the input. draws: number of draws; the one with the lowest crest factor is
+        kept. After a few tens of draws the phases still count as random; a search would make them
+        dependent.
     """
     random = np.random.default_rng(seed)
     size = np.ones(len(grid.excited))
@@ -102,13 +102,13 @@ def course(
 
 
 ALIKE = 1e-3
-"""Largest mean square change between periods, over twice the variance, of a repetition."""
+"""Largest mean square change, over twice the variance, between two repeated periods."""
 UNLIKE = 0.5
-"""Least value of this ratio between repetitions."""
+"""Value that this ratio exceeds at a lag between repetitions."""
 LOOKED_AT = 1 << 21
-"""Most samples at the end of a recording that are used."""
+"""Largest number of samples used, from the end of a recording."""
 STRONG, MANY = 0.2, 10
-"""Least amplitude of a strong line over the largest, and least number of them in a multisine."""
+"""Least amplitude of a strong line over the largest one; fewest strong lines of a multisine."""
 
 
 def repetition(signal: Array) -> int | None:

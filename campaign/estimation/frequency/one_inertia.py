@@ -67,8 +67,8 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
     """
     fit = rational_fit(measured, (1, 3))
     if fit.zeros[0].real > 0:
-        # A right zero with less delay has almost the same response, but no spring has negative
-        # damping.
+        # A zero in the right half plane with less delay has almost the same response, but no spring
+        # has negative damping.
         mirrored = np.array([fit.numerator[0], -fit.numerator[1]])
         later = fit.delay + 2.0 / float(fit.zeros[0].real)
         fit = rational_fit(
@@ -79,10 +79,10 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
     def told(theta: Array) -> Array:
         b, a = theta[:2], theta[2:6]
         total = a[1] / b[0] - a[0] * b[1] / b[0] ** 2
-        rise = math.sqrt(abs(b[0] / a[3] * total)) * unit
+        resonance = math.sqrt(abs(b[0] / a[3] * total)) * unit
         roots = np.polynomial.polynomial.polyroots(a)
         root = max(roots, key=abs)
-        return np.array([total / unit, rise / (2.0 * math.pi), -root.real / abs(root)])
+        return np.array([total / unit, resonance / (2.0 * math.pi), -root.real / abs(root)])
 
     theta = fit.vector
     values = told(theta)

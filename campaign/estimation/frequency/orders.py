@@ -46,10 +46,10 @@ def order_of(fit: RationalFit) -> tuple[int, int]:
 
 
 def chosen_order(measured: MeasuredResponse, highest: int = HIGHEST) -> ChosenOrder:
-    """Fits of all orders up to `highest`, with the choice by the criterion.
+    """Fit all orders up to `highest` and choose one by Schwarz' criterion.
 
     The search ends after two consecutive orders of the denominator without a better criterion.
-    Raises ValueError where no order has a fit, or all are refused (such as for an unstable pole).
+    Raises ValueError if no order has a usable fit (an unstable pole makes a fit unusable).
     """
     tried: dict[tuple[int, int], RationalFit] = {}
     refused: dict[tuple[int, int], str] = {}
@@ -84,7 +84,7 @@ def chosen_order(measured: MeasuredResponse, highest: int = HIGHEST) -> ChosenOr
 
 
 def with_order(estimate: Estimate, others: Sequence[float]) -> Estimate:
-    """Add the difference to the values of other possible orders as a systematic part.
+    """Add the difference from the values of other possible orders as a systematic part.
 
     The largest difference is the half-width of a uniform distribution.
     """

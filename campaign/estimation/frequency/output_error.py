@@ -1,9 +1,9 @@
 """Output error of a fitted response for a recorded input.
 
 The spectrum of the input times the response is the output for a periodic input. Any other output
-differs from it by free motions of the function's poles (Pintelon and Schoukens (2012), 2.6.3),
-which are fitted with an offset and a drift. Both sides have the same zero-phase filter over the
-fitted band: at lower frequencies, friction and offsets of the torque dominate the motion.
+differs from it by free motions of the function's poles (Pintelon and Schoukens (2012), 2.6.3). They
+are fitted with an offset and a drift. Both sides have the same zero-phase filter over the fitted
+band, because at lower frequencies friction and offsets of the torque dominate the motion.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Simulated:
 
     Attributes:
         time: (s).
-        measured, simulated: with the same filter, without their ends.
+        measured, simulated: after the same filter, without the ends.
     """
 
     time: Array
@@ -63,7 +63,7 @@ def simulated_output(
         poles: of the response (rad/s).
         lowest, highest: of the band (Hz).
 
-    Raises ValueError for a recording shorter than three periods of `lowest`, or a band above half
+    Raises ValueError for a recording shorter than six periods of `lowest`, or a band above half
     the sampling rate.
     """
     from scipy.signal import butter, sosfiltfilt
@@ -94,7 +94,7 @@ def simulated_output(
 
 
 def _free(poles: ComplexArray, time: Array) -> list[Array]:
-    """Free motions with the largest value 1, with an offset and a drift."""
+    """Offset, drift and free motions, each with the largest value 1."""
     motions = [np.ones_like(time), time / time[-1]]
     for pole in poles[poles.imag >= 0.0]:
         begin = time if pole.real <= 0.0 else time - time[-1]
@@ -106,7 +106,7 @@ def _free(poles: ComplexArray, time: Array) -> list[Array]:
 def output_error(name: str, simulated: Sequence[Simulated], lowest: float) -> Estimate:
     """Relative error of the output over all recordings, with an interval over parts of them.
 
-    lowest: of the band (Hz); a part has three periods of it.
+    lowest: of the band (Hz); a part has at least three periods of it, if the recording has.
     """
     parts = []
     for each in simulated:

@@ -24,10 +24,10 @@ class HeldAgainst:
         predicted: by the model, shape (n,).
         deviation: standard deviation of either part of measured less predicted, shape (n,), by
             scatter of measurement and fit; NaN where the scatter of the measurement is unknown.
-        square: squared difference over its expectation, all frequencies together, with the
-            correlation by the fit's error: 1 in the mean for a correct model; NaN likewise.
-        most: 3.3 standard deviations of `square` above 1.
-        reason: why there is no deviation; `NONE` where there is one.
+        square: squared difference of all frequencies over its expectation, including their
+            correlation by the fit's error; mean 1 for a correct model; NaN as `deviation`.
+        most: 1 plus 3.3 standard deviations of `square`.
+        reason: why `deviation` is unknown; otherwise `NONE`.
     """
 
     measured: MeasuredResponse
@@ -81,7 +81,7 @@ def held_against(
         return HeldAgainst(measured, predicted, unknown, math.nan, math.nan, NO_DEVIATION())
     stacked = np.concatenate([jacobian.real, jacobian.imag])
     shared = stacked @ covariance @ stacked.T
-    # A factor for estimated variances, because the mean of their inverse is too large.
+    # `mean` corrects for estimated variances: the mean of their inverse is too large.
     own = np.concatenate([weights.error, weights.error]) ** 2 * weights.mean
     whole = shared + np.diag(own)
     parts = np.concatenate([difference.real, difference.imag])

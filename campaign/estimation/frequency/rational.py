@@ -48,7 +48,7 @@ class Weights:
         error: standard deviation of either part of each value, shape (n,).
         mean: expectation of one squared, weighted residual of a correct model.
         spread: variance of the sum of the two squares of one value.
-        inflation: of a covariance by the scatter of the weights.
+        inflation: factor of a covariance for the scatter of the weights.
     """
 
     error: Array
@@ -58,7 +58,7 @@ class Weights:
 
     @staticmethod
     def of(measured: MeasuredResponse) -> Weights:
-        """Raises ValueError for variances that are missing or have too few degrees of freedom."""
+        """Weights; ValueError for missing variances, or with too few degrees of freedom."""
         freedom = float(np.min(measured.freedom, initial=math.inf))
         if not np.all(np.isfinite(measured.variance)) or freedom < LEAST_FREEDOM:
             raise ValueError(
@@ -78,19 +78,19 @@ class Weights:
 
 @dataclass(frozen=True)
 class RationalFit:
-    """A fitted function; coefficients lowest power first, of s over `2 pi scale`.
+    """A fitted function; coefficients of powers of s over `2 pi scale`, lowest power first.
 
     Attributes:
         numerator, denominator: shapes (nb + 1,) and (na + 1,).
         delay: (s).
         scale: (Hz).
-        covariance: of (numerator, denominator, delay), shape (p, p); not yet with `excess`.
-        residuals: weighted, complex, shape (n,); squares of either part are 1 in the mean.
+        covariance: of (numerator, denominator, delay), shape (p, p), without `excess`.
+        residuals: weighted, complex, shape (n,); the mean square of either part is 1.
         excess: weighted square over its expectation for a correct model.
-        misfit: why it is no model of the response; `NONE` where it may be one.
+        misfit: why it is no model of the response; `NONE` if it may be one.
         parameters: number of free parameters.
         lowest, highest: of the frequencies (Hz).
-        condition: number of the weighted Jacobian, its columns scaled to length 1.
+        condition: condition number of the weighted Jacobian with columns of length 1.
     """
 
     numerator: Array
@@ -176,15 +176,15 @@ def rational_fit(
     delays: Array | None = None,
     start: Array | None = None,
 ) -> RationalFit:
-    """Best fit of a function of an order (of numerator and denominator).
+    """Best fit of a function of one `order` (of numerator, of denominator).
 
     Args:
         measured: at n frequencies, with a variance of enough degrees of freedom.
         delays: start values (s); default: `delays_to_try`.
         start: start value (numerator, denominator, delay) instead.
 
-    Raises ValueError for too few frequencies, a numerator above the denominator, or variances that
-    are no weights.
+    Raises ValueError for too few frequencies, a numerator of higher order than the denominator, or
+    variances that cannot weight a fit.
     """
     up, down = order
     free = up + down + 2
@@ -256,7 +256,7 @@ def _model(theta: Array, s: ComplexArray, up: int, scale: float) -> ComplexArray
 
 
 def _polynomial(s: ComplexArray, coefficients: Array) -> ComplexArray:
-    """Polynomial by Horner's scheme: as numpy's `polyval`, without its checks of arguments."""
+    """Polynomial by Horner's scheme; as numpy's `polyval`, without checks of arguments."""
     value = coefficients[-1] + s * 0.0
     for coefficient in coefficients[-2::-1].tolist():
         value = coefficient + value * s
@@ -330,7 +330,7 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
     """Weighted square over its expectation, and the reason of a misfit or `NONE`.
 
     Args:
-        residuals: weighted, shape (n,); squares of either part are 1 in the mean.
+        residuals: weighted, shape (n,); the mean square of either part is 1.
     """
     n = len(residuals)
     left = max(2 * n - parameters, 1)
@@ -338,7 +338,7 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
     excess = square / left
     chance = math.sqrt(n * weights.spread) / weights.mean / left
     together = float(np.real(np.sum(residuals[1:] * np.conj(residuals[:-1])))) / max(square, 1e-300)
-    # For white residuals its standard deviation is 1 / sqrt(2 n), less after a fit.
+    # For white residuals `together` has the standard deviation 1 / sqrt(2 n), less after a fit.
     alike = together * math.sqrt(2.0 * n)
     if excess > MOST_EXCESS and excess > 1.0 + SURE * chance:
         return excess, LARGE_RESIDUALS(times=excess)

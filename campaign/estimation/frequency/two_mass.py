@@ -61,10 +61,10 @@ def two_mass(
         responses: from torque at the motor (N m) to rate (rad/s), by the place of the rate sensor.
         torque_uncertainty: relative standard uncertainty of the torque (torque constant), a
             systematic part of all values in N m.
-        rigid: whether it is one inertia; None: decided by the response of a single sensor.
+        rigid: whether the drive is one inertia; None: the response of a single sensor decides.
 
-    A fit with residuals above scatter is a *misfit*: values without intervals.
-    Raises ValueError for variances that are no weights, or too few frequencies.
+    A fit with residuals above scatter is a *misfit*: its values have no intervals.
+    Raises ValueError for variances that cannot weight a fit, or too few frequencies.
     """
     if not responses:
         raise ValueError("no response of a motor or a load")
@@ -82,23 +82,23 @@ def two_mass(
 def _or_rigid(
     found: TwoMass, responses: Mapping[Side, MeasuredResponse], rigid: bool | None
 ) -> TwoMass:
-    """One inertia where it fits the response of a single sensor better, by Schwarz' criterion.
+    """Replace the fit by one inertia, if that describes the response of a single sensor better.
 
-    Also where two masses have no resonance in the measured band. One inertia must be no misfit.
+    By Schwarz' criterion, or for no resonance in band. `rigid` also accepts a misfit.
     """
     if len(responses) > 1 or rigid is False:
         return found
     ((side, measured),) = responses.items()
     one = rigid_fit(measured, side)
-    rise = found.estimates["resonance"]
-    seen = rise.origin is Origin.MEASURED and rise.has_interval
-    seen = seen and measured.frequency[0] <= rise.value <= measured.frequency[-1]
-    better = not seen or one.criterion < found.criterion
+    resonance = found.estimates["resonance"]
+    visible = resonance.origin is Origin.MEASURED and resonance.has_interval
+    visible = visible and measured.frequency[0] <= resonance.value <= measured.frequency[-1]
+    better = not visible or one.criterion < found.criterion
     return one if rigid or (better and not one.misfit) else found
 
 
 def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> TwoMass:
-    """As `two_mass`, for one of the two structures and a torque without uncertainty."""
+    """Fit one of the two structures, with a torque without uncertainty; else as `two_mass`."""
     sides: tuple[Side, ...] = tuple(sorted(responses, reverse=True))  # motor before load
     weights = [Weights.of(responses[side]) for side in sides]
     size = sizes(responses, sides)
@@ -176,12 +176,12 @@ def _numbers(point: Array) -> Array:
     """Quantities of `UNITS` at a point, shape (10,)."""
     first, ratio, spring = np.exp(point[:3])
     second, damping = first * ratio, point[3]
-    rise = math.sqrt(spring * (1.0 / first + 1.0 / second)) / (2.0 * math.pi)
-    dip = math.sqrt(spring / second) / (2.0 * math.pi)
+    resonance = math.sqrt(spring * (1.0 / first + 1.0 / second)) / (2.0 * math.pi)
+    antiresonance = math.sqrt(spring / second) / (2.0 * math.pi)
     share = 0.5 * damping / math.sqrt(spring * second)
     return np.array(
-        [first, second, first + second, spring, damping, rise, mode_damping(point), dip, share,
-         ratio]
+        [first, second, first + second, spring, damping, resonance, mode_damping(point),
+         antiresonance, share, ratio]
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from campaign.estimation.frequency.rational import delays_to_try
 
 Side = Literal["motor", "load"]
 STARTS = 8
-"""Number of best points of a grid from which a fit starts."""
+"""Number of points, the best of a grid, from which a fit starts."""
 RATIOS = (0.25, 0.4, 0.55, 0.7, 0.82, 0.92, 0.97)
 """Antiresonance over resonance on the grid."""
 DAMPINGS = (0.01, 0.05, 0.2)
@@ -40,7 +40,7 @@ def model(frequency: Array, point: Array, side: Side, delay: float) -> ComplexAr
 def model_jacobian(
     frequency: Array, point: Array, sides: tuple[Side, ...], side: Side
 ) -> ComplexArray:
-    """Derivative of `model` by all parameters, (n, p); delays of `sides` are after the 7 others."""
+    """Derivative of `model` by all parameters, (n, p): the 7 of `point`, then delays of `sides`."""
     s = 2j * np.pi * np.asarray(frequency, dtype=float)
     first, ratio, spring = np.exp(np.clip(point[:3], -100.0, 100.0))
     coupling = spring / s + point[3]
@@ -82,8 +82,8 @@ def polynomials(point: Array, side: Side) -> tuple[Array, Array]:
 def sizes(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -> Array:
     """Scale of each parameter.
 
-    1 for logarithms; for damping and stiffness from the whole inertia at the middle frequency w, a
-    tenth of J w and J w²; for delays 0.1 / w.
+    1 for logarithms, 0.1 J w for damping, J w² for the ground stiffness, 0.1 / w for delays. J is
+    the total inertia, w the middle frequency (rad/s).
     """
     measured = responses[sides[0]]
     middle = 2.0 * np.pi * float(np.sqrt(measured.frequency[0] * measured.frequency[-1]))
@@ -94,7 +94,7 @@ def sizes(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -
 
 
 def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) -> list[Array]:
-    """Best points of a grid of resonances, antiresonances and dampings, by the log of gain."""
+    """Best grid points by the log of gain; half of them again with delays of the responses."""
     frequency = np.concatenate([responses[side].frequency for side in sides])
     candidates = np.geomspace(frequency.min() * 1.05, frequency.max() * 1.2, 48)
     ratio, damping = np.meshgrid(RATIOS, DAMPINGS, indexing="ij")
@@ -129,7 +129,7 @@ def starts(responses: Mapping[Side, MeasuredResponse], sides: tuple[Side, ...]) 
 
 
 def mode_damping(point: Array) -> float:
-    """Damping ratio of the resonance: the poles of `model` with the largest frequency."""
+    """Damping ratio of the poles of `model` with the largest frequency; 1 without a pair."""
     roots = np.polynomial.polynomial.polyroots(polynomials(point, "motor")[1])
     pairs = roots[np.abs(roots.imag) > 0]
     if not len(pairs):

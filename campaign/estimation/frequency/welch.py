@@ -83,8 +83,8 @@ def _coherence(cross: ComplexArray, one: Array, other: Array) -> Array:
 def spectra(records: Sequence[Record], segment: int | None = None) -> Spectra:
     """Spectra averaged over the segments of all records (Welch, IEEE Trans. AU-15 (1967) 70).
 
-    segment: length in samples; the resolution is rate / segment. Default: a 16th of all samples, at
-        most the shortest record.
+    segment: length in samples; the resolution is rate / segment. Default: 1/16 of all samples, at
+        most the length of the shortest record.
 
     Raises ValueError for records of different rates, or too short for enough averages.
     """
@@ -143,7 +143,7 @@ def _segments(record: Record, shape: Array, step: int, with_reference: bool) -> 
 
 
 def _worth(shape: Array, step: int, counts: Sequence[int]) -> float:
-    """Effective number of independent segments of overlapping ones (Welch 1967, white signals)."""
+    """Effective number of overlapping segments, for white signals (Welch 1967)."""
     total = 0.0
     power = float(np.sum(shape**2))
     for count in counts:
@@ -161,14 +161,14 @@ def welch_response(
     estimator: Estimator = "H1",
     segment: int | None = None,
 ) -> MeasuredResponse:
-    """Output over input, with scatter from coherence and averages, bias from half the segment.
+    """Output over input; scatter from coherence and averages, bias from half the segment length.
 
     Args:
         excited: `input`: the input is set from outside, without feedback; `reference`: a loop
             generates the input, and `Record.reference` is the external signal of the loop.
         estimator: for an excited input: H1 = S_yu / S_uu (noise on the output only), H2 = S_yy /
-            S_uy (on the input only), Hv, their geometric mean (on both). With a reference it is
-            always S_yr / S_ur.
+            S_uy (on the input only), Hv: their geometric mean (on both). With a reference the
+            estimator is always S_yr / S_ur.
 
     Lines that the reference does not excite (first-stage F below 10) are omitted.
     Raises ValueError for a loop without its reference, and as `spectra` does.
@@ -198,18 +198,18 @@ def _of_spectra(whole: Spectra, excited: Excited, estimator: Estimator) -> Measu
         ratio = np.sqrt(np.abs(h1) * np.abs(h2)) * np.exp(1j * np.angle(yu))
         values = {"H1": h1, "H2": h2, "Hv": ratio}[estimator]
         coherence = whole.coherence
-        left = (1.0 - coherence) / np.maximum(coherence, tiny)
-        variance = np.abs(values) ** 2 * left / (n - 1.0)
+        residual = (1.0 - coherence) / np.maximum(coherence, tiny)
+        variance = np.abs(values) ** 2 * residual / (n - 1.0)
         if estimator == "H1":  # the same, without a division by a coherence of zero
             variance = yy * (1.0 - coherence) / np.maximum(uu, tiny) / (n - 1.0)
         name: str = estimator
     else:
         rr, yr, ur = whole.of_reference
         values = yr / np.where(np.abs(ur) > 0, ur, tiny)
-        # Residual of the output: no part of it is caused by the reference.
-        left = yy - 2.0 * np.real(np.conj(values) * yu) + np.abs(values) ** 2 * uu
-        left = np.maximum(left, 0.0) * n / (n - 1.0)
-        variance = left * rr / np.maximum(np.abs(ur) ** 2, tiny) / n
+        # Residual of the output: the reference causes no part of it.
+        residual = yy - 2.0 * np.real(np.conj(values) * yu) + np.abs(values) ** 2 * uu
+        residual = np.maximum(residual, 0.0) * n / (n - 1.0)
+        variance = residual * rr / np.maximum(np.abs(ur) ** 2, tiny) / n
         coherence = _coherence(yr, yy, rr)
         name = "S_yr / S_ur"
     freedom = np.full(len(values), 2.0 * (n - 1.0))
@@ -221,16 +221,16 @@ def _of_spectra(whole: Spectra, excited: Excited, estimator: Estimator) -> Measu
 
 
 def _with_bias(found: MeasuredResponse, half: MeasuredResponse) -> MeasuredResponse:
-    """Add the bias by the length of the segments.
+    """Add the bias that the length of the segments causes.
 
-    It decreases with the square of the length (Hann): it is a third of the change by half the
-    length. The part of scatter in that change is subtracted, and the mean over five lines taken.
+    It decreases with the square of the length (Hann). Therefore it is a third of the change at half
+    the length. Scatter is subtracted from that change, which is then averaged over five lines.
     """
     coarse = np.interp(found.frequency, half.frequency, half.values.real) + 1j * np.interp(
         found.frequency, half.frequency, half.values.imag
     )
     change = np.abs(coarse - found.values) ** 2
-    # A line of half the length has half the variance, most of which both lengths have in common.
+    # With half the length a line has half the variance; both lengths share most of it.
     chance = np.interp(found.frequency, half.frequency, half.variance)
     kernel = np.full(5, 0.2)
     smooth = np.convolve(np.pad(change - chance, 2, mode="edge"), kernel, "valid")

@@ -25,10 +25,10 @@ TOO_FEW_ROWS = Cause("too few independent rows", "the residuals have too few ind
 def estimates(
     fit: Regression, terms: Sequence[Term], parts: Mapping[str, Array | None]
 ) -> dict[str, Estimate]:
-    """Estimates of the coefficients, by the names of the terms: scatter with autocorrelation.
+    """Estimates of the coefficients by the names of the terms; scatter includes autocorrelation.
 
-    parts: sources of systematic parts, with the shift of the coefficients by each, shape (k,);
-        None: unknown.
+    parts: shift of the coefficients by each source of a systematic part, shape (k,); None:
+        unknown.
     """
     coefficients = {}
     for index, term in enumerate(terms):
@@ -52,7 +52,7 @@ def shifts(
     filterings: Sequence[FilterSettings],
     delay: float = 0.0,
 ) -> Array | None:
-    """Largest shift of each coefficient with other filters, shape (k,); None if none has a fit.
+    """Largest shift of each coefficient by other filters, shape (k,); None if none has a fit.
 
     delay: of the force in these rows (s).
     """
@@ -64,7 +64,7 @@ def shifts(
 
 
 def farthest(values: Array, others: Iterable[Callable[[], Array]]) -> Array | None:
-    """Largest distance of other values, shape (k,); None without any. ValueError is skipped."""
+    """Largest distance of `others` from `values`, shape (k,), without those with a ValueError."""
     distances = []
     for other in others:
         with suppress(ValueError):

@@ -1,7 +1,7 @@
 """Delay between recorded drive signal and motion.
 
-A command with a zero-order hold acts half a sample late; a bus or a filter adds to the delay. The
-delay times the inertia acts as a term of the jerk, and biases all terms that are similar to it.
+A command with a zero-order hold acts half a sample late. A bus or a filter adds to the delay. The
+delay times the inertia acts as a term of the jerk and biases all terms that are similar to it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from campaign.estimation.inverse.terms import Terms
 from campaign.reason import Cause
 
 LONGEST = 0.02
-"""Largest delay of the search (s), unless `SAMPLES` samples are longer."""
+"""Largest delay in the search (s), unless `SAMPLES` samples are longer."""
 SAMPLES = 5.0
 """Least range of the search in samples."""
 OWN = 0.05
@@ -43,9 +43,9 @@ STEADY_FORCE = Cause(
 def find_delay(motions: Sequence[Motion], terms: Terms, filtering: FilterSettings) -> Estimate:
     """Delay of the force after its record (s); negative if it is recorded late.
 
-    The difference to the result with half the band is a systematic part: the response of a loop to
-    sensor noise looks like a delay, more so with a wider band. All motions have one sample rate.
-    Not determined where the minimum of the residual lies at an end of the search.
+    The difference from the result with half the band is a systematic part, because the response of
+    a loop to sensor noise resembles a delay, more so in a wider band. All motions have one sample
+    rate. Not determined if the minimum of the residual lies at an end of the search.
     """
     delay = _in_band(motions, terms, filtering)
     if math.isnan(delay.value):

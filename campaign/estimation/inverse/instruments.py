@@ -1,7 +1,7 @@
 """Instrumental variables from the commanded motion.
 
-A measured rate contains noise, and in a loop the force responds to that noise: both cause a bias of
-least squares. The commanded motion is independent of the noise. Source: Janot, Vandanjon, Gautier,
+A measured rate contains noise, and in a loop the force responds to that noise. Both bias least
+squares. The commanded motion is independent of the noise. Source: Janot, Vandanjon, Gautier,
 IEEE Trans. Control Syst. Technol. 22 (2014); strength of instruments: Sanderson and Windmeijer,
 J. Econometrics 190 (2016).
 """
@@ -23,7 +23,7 @@ from campaign.estimation.inverse.regression import (
 )
 
 WEAK = 10.0
-"""F of the first stage below which a coefficient is not determined by its instrument."""
+"""F of the first stage below which the instrument does not determine a coefficient."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class InstrumentFit:
 
 
 def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> InstrumentFit:
-    """Coefficients from the same columns of another motion, row by row.
+    """Coefficients with the same columns of another motion as instruments, row by row.
 
-    Raises ValueError where the instruments do not determine the coefficients.
+    Raises ValueError if the instruments do not determine the coefficients.
     """
     design, force = stacked(pieces)
     other, _ = stacked(instruments)
@@ -70,9 +70,9 @@ def _strength(design: Array, other: Array, pieces: Sequence[Piece]) -> Array:
         own = design[:, index]
         if rest.shape[1]:
             own = own - rest @ np.linalg.lstsq(explained(rest), own, rcond=None)[0]
-        seen = explained(own)
-        left = own - seen
-        count = effective_count(np.split(left, cuts))
-        noise = max(float(left @ left), float(np.finfo(float).tiny))
-        strengths.append(float(seen @ seen) / noise * max(count - other.shape[1], 1.0))
+        projection = explained(own)
+        residual = own - projection
+        count = effective_count(np.split(residual, cuts))
+        noise = max(float(residual @ residual), float(np.finfo(float).tiny))
+        strengths.append(float(projection @ projection) / noise * max(count - other.shape[1], 1.0))
     return np.array(strengths)

@@ -1,6 +1,6 @@
 """A motion prepared for regression: zero-phase filter, derivatives, decimation.
 
-A recording contains a position (or a rate); a regression needs rate and acceleration, with the same
+A recording contains a position (or a rate). A regression needs rate and acceleration, with the same
 filter on both sides. Source: Janot, Vandanjon, Gautier, "A generic instrumental variable approach
 for industrial robot identification", IEEE Trans. Control Syst. Technol. 22 (2014), section II.
 """
@@ -25,7 +25,7 @@ LOW_PASS, LOW_PASS_SHARE = 100.0, 0.2
 REGRESSION_RATE = 100.0
 """Default rate after decimation (Hz), approximately."""
 FASTER = (2.0, 5.0)
-"""Multiples of the slowest rate, below which rows are omitted to see the effect of slow sliding."""
+"""Multiples of the slowest rate; omitting rows below them shows the effect of slow sliding."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class FilterSettings:
     Attributes:
         low_pass: corner of the position's (or the rate's) zero-phase low-pass (Hz).
         decimation: factor of the decimation, which has its own low-pass; 1: none.
-        skip: samples omitted at the beginning, after differentiation.
-        slowest: rate (rad/s, or m/s) below which rows count as standstill and are omitted with
+        skip: number of samples omitted at the beginning, after differentiation.
+        slowest: rate (rad/s, or m/s) below which rows count as standstill. They are omitted with
             their neighbors, because friction at standstill is equal to the force.
     """
 
@@ -53,7 +53,7 @@ class FilterSettings:
 
     @property
     def half_band(self) -> Self:
-        """Settings with half the bandwidth of rows: less noise."""
+        """Settings with half the bandwidth of rows, for less noise."""
         return replace(self, decimation=2 * self.decimation)
 
     @property
@@ -121,7 +121,7 @@ def sample_rate_of(time: Array) -> float:
 def zero_phase(samples: Array, low_pass: float, sample_rate: float) -> Array:
     """Butterworth low-pass, forward and backward, shape (n,).
 
-    No filter for a corner at or above half the sample rate. Raises ValueError for too few samples.
+    A corner at or above half the sample rate: no filter. Raises ValueError for too few samples.
     """
     from scipy.signal import butter, filtfilt
 
@@ -136,8 +136,8 @@ def decimated(columns: Array, factor: int) -> Array:
     """Every `factor`-th row of `columns`, shape (n, k), after a zero-phase Chebyshev low-pass.
 
     As in MATLAB's `decimate`, the last sample is always kept. Both sides of a regression have the
-    same filter, and so the same weights. The gain is scaled to 1 at zero frequency, where a filter
-    of even order has its ripple.
+    same filter and thus the same weights. The gain is scaled to 1 at zero frequency, because a
+    filter of even order has its ripple there.
     """
     return _smooth(columns, factor)[first_kept(len(columns), factor) :: factor]
 
@@ -166,7 +166,7 @@ def kept_times(motion: Motion, filtering: FilterSettings) -> Array:
 
 
 def later(samples: Array, delay: float, sample_rate: float) -> Array:
-    """Signal of shape (n,) with a `delay` (s), by cubic interpolation; constant beyond the ends."""
+    """Delay a signal (n,) by `delay` (s), with cubic interpolation; constant beyond the ends."""
     from scipy.interpolate import CubicSpline
 
     if delay == 0.0:
@@ -180,8 +180,8 @@ def later(samples: Array, delay: float, sample_rate: float) -> Array:
 def _decimator(factor: int) -> Array:
     """Low-pass in sections of second order, shape (n, 6).
 
-    One polynomial is inaccurate for a large factor. Cached: its design takes longer than to filter
-    a short motion.
+    One polynomial is inaccurate for a large factor. The result is cached, because the design takes
+    longer than the filtering of a short motion.
     """
     from scipy.signal import cheby1
 
@@ -195,7 +195,7 @@ def late_rows(
     """Decimated rows of a signal, shape (n,), as a function of its delay (s).
 
     Delay and low-pass commute: the signal is filtered once, and a delay needs only an
-    interpolation. At the ends the rows differ from `decimated(later(...))`.
+    interpolation. At the ends, rows differ from `decimated(later(...))`.
     """
     from scipy.interpolate import CubicSpline
 

@@ -1,4 +1,4 @@
-"""Spatial period of force or friction: of a screw, a motor, a gear."""
+"""Spatial period of force or friction, as of a screw, a motor or a gear."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from campaign.arrays import Array
 
 FEWEST, MOST = 1.0, 400.0
-"""Range of the search: number of periods in the travel."""
+"""Range of the search, as numbers of periods in the travel."""
 FINE = 8
-"""Tried periods per period in the travel: neighbors differ by an eighth of a period over it."""
+"""Tried values per period in the travel: over it, neighbors differ by an eighth of a period."""
 FEWEST_ROWS = 10.0
-"""Fewest rows per period at the rate of a row: faster rows do not resolve the period."""
+"""Fewest rows per period, at the rate of a row; faster rows do not resolve the period."""
 SLOW = 0.1
 """Share of the slowest moving rows that determines the shortest period."""
 CERTAIN = 2.0
-"""Periods in the travel above which any wave counts. Different friction at both ends of the travel,
-where the axis reverses, looks like fewer periods."""
+"""Periods in the travel above which any wave counts. Friction that differs between the ends of the
+travel, where the axis reverses, resembles a wave of fewer periods."""
 WIDE = 0.5
 """Least share of the sum of squares that a longer wave must explain to count."""
 FEWEST_PERIODS = 3.0
@@ -26,9 +26,9 @@ FEWEST_PERIODS = 3.0
 def find_period(position: Array, rate: Array, residuals: Array, interval: float) -> float | None:
     """Strongest spatial period (rad, or m) of residuals, shape (n,); None without a candidate.
 
-    Waves of force and of friction (with the sign of the rate) have the same weight. For each period
-    only rows that are slow enough to resolve it count. Held-out blocks decide later whether the
-    model gets a term for it.
+    Waves of force and of friction (with the sign of the rate) have the same weight. Each period
+    uses only rows slow enough to resolve it. Held-out blocks decide later whether the model
+    includes a term for the period.
 
     Args:
         rate: zero in omitted rows.
@@ -55,7 +55,7 @@ def _gains(
 ) -> Array:
     """Rise of the log-likelihood, up to a factor, by waves of each period; 0 for too few rows.
 
-    In addition to a spring and friction, which are similar to a long wave.
+    The model without waves has a spring and friction, which are similar to a long wave.
     """
     squares = np.zeros((len(periods), 7, 7))
     rights, (sizes, rows) = np.zeros((len(periods), 7)), np.zeros((2, len(periods)))
@@ -80,10 +80,10 @@ def _gains(
 
 
 def _unexplained(squares: Array, rights: Array, sizes: Array) -> Array:
-    """Residual sums of squares, shape (m,), from products.
+    """Residual sums of squares of m regressions, shape (m,).
 
-    Products of k columns with each other, shape (m, k, k), with the values, (m, k), and squares of
-    the values, (m,).
+    squares: products of k columns with each other, shape (m, k, k). rights: products with the
+    values, (m, k). sizes: sums of squares of the values, (m,).
     """
     least = float(np.finfo(float).eps) * squares.shape[-1]
     inverse = np.linalg.pinv(squares, rcond=least, hermitian=True)

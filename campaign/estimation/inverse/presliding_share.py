@@ -1,8 +1,8 @@
 """Share of a motion in which the axis slides, from a model of bristles in place of dry friction.
 
-Below breakaway, friction is a spring with damping: a regression on the sign of the rate takes its
-damping for viscous friction, and a part of its spring for inertia. Bristles of Dahl's model build
-dry friction up over a distance; a regression at several distances estimates it.
+Below breakaway, friction is a spring with damping. A regression on the sign of the rate takes this
+damping for viscous friction, and a part of the spring for inertia. In Dahl's model, bristles build
+up dry friction over a distance. Regressions at several distances estimate this distance.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from campaign.estimation.inverse.terms import TERMS, Term
 from campaign.reason import Cause
 
 REACHES = np.geomspace(1e-3, 10.0, 13)
-"""Tried distances over which dry friction builds up, as shares of the travel: from those that a
-motion over all of it hardly shows, to those over which friction is a spring throughout."""
+"""Tried distances over which dry friction builds up, over the travel. The shortest have hardly an
+effect on the motion; for the longest, friction is a spring over the whole travel."""
 SETTLED = 1.0 - MATTERS
-"""Share of dry friction from which on an axis slides: what it lacks does not matter."""
+"""Share of dry friction above which an axis slides; the rest is negligible."""
 MOST = 0.5
-"""Share of the moving rows: where an axis slides in fewer, bristles outweigh sliding in a
-regression: it weighs all rows alike."""
+"""Share of the moving rows. If an axis slides in fewer, bristles outweigh sliding in a regression,
+because it weights all rows equally."""
 HARDLY_SLIDES = Cause(
     "hardly slides",
     "the axis slides in {percent:.0f} % of the motion; below breakaway, friction is a spring with "
@@ -38,12 +38,12 @@ HARDLY_SLIDES = Cause(
 
 @dataclass(frozen=True)
 class Presliding:
-    """Fit of bristles.
+    """A model with bristles, fitted to motions.
 
     Attributes:
         reach: distance over which friction builds up to 1 - 1/e of dry friction (rad, or m).
         share: of the moving rows in which the axis slides.
-        values: coefficients by name, without delay unless one is stated: damping resembles a delay.
+        values: coefficients by name; without delay unless one is stated, as damping resembles one.
     """
 
     reach: float
@@ -59,13 +59,13 @@ def presliding(
     *,
     stated: bool = False,
 ) -> Presliding | None:
-    """Bristles in motions in which the axis hardly slides; None if it slides, or none are seen.
+    """Fit bristles to motions in which the axis hardly slides; None if it slides or shows none.
 
-    They are seen if their force matters, and if they describe the force clearly better than no dry
-    friction does, and dry friction with all further terms (`chosen`) not clearly better than they.
+    Conditions: the force of the bristles matters; they describe the force clearly better than no
+    dry friction; dry friction with all further terms (`chosen`) is not clearly better than they.
 
     Args:
-        delay: of the force in `chosen` (s), as `stated` by the user or estimated.
+        delay: of the force in `chosen` (s). stated: whether the user states it.
     """
     shared = ("inertia", "viscous", "viscous_positive", "viscous_negative")
     terms = (*(term for term in chosen.terms if term.name in shared), TERMS["offset"])
@@ -81,8 +81,8 @@ def presliding(
     state = np.concatenate([rows(m, best.terms, filtering).columns[:, -2] for m in motions])
     share = float(np.mean(np.abs(state[state != 0.0]) > SETTLED))
     matter = np.any(np.abs(best.fit.values[-2:]) > best.fit.matters[-2:])
-    seen = matter and clearly_better(best, without)
-    if share >= MOST or not seen or clearly_better(chosen, best):
+    significant = matter and clearly_better(best, without)
+    if share >= MOST or not significant or clearly_better(chosen, best):
         return None
     if not stated:
         best = structure(motions, best.terms, filtering)
@@ -90,7 +90,7 @@ def presliding(
 
 
 def bristles(reach: float) -> tuple[Term, Term]:
-    """Terms of bristles that build up over a `reach` (rad, or m): their friction, their damping."""
+    """Friction and damping of bristles that build up over a `reach` (rad, or m), as terms."""
 
     def damping(motion: Motion) -> Array:
         return np.asarray(np.gradient(deflection(motion.position, reach)) * motion.sample_rate)
@@ -102,7 +102,7 @@ def bristles(reach: float) -> tuple[Term, Term]:
 
 
 def deflection(position: Array, reach: float) -> Array:
-    """Deflection of bristles over its largest value, shape (n,), at first 0.
+    """Deflection of bristles over its largest value, shape (n,); it starts at 0.
 
     dz/dq = (sign dq - z) / reach (Dahl 1968), in closed form between reversals.
     """

@@ -1,9 +1,9 @@
 """Linear regression with autocorrelated residuals over several recordings.
 
 Ordinary deviations of an inverse dynamic model are 4 to 5 times too small, because its residuals
-are not white noise. The covariance here is that of `long_run`. Quantiles depend on the bandwidth
-(Kiefer and Vogelsang, Econom. Theory 21, 2005, Table 1): with a long bandwidth the coverage of
-Student's t is too low.
+are not white noise. This module uses the covariance of `long_run`. Quantiles depend on the
+bandwidth (Kiefer and Vogelsang, Econom. Theory 21, 2005, Table 1), because with a long bandwidth
+the coverage of Student's t is too low.
 """
 
 from __future__ import annotations
@@ -49,17 +49,17 @@ class Regression:
     Attributes:
         values: coefficients, shape (k,).
         ordinary: deviations for independent residuals, shape (k,).
-        robust: deviations with autocorrelation, shape (k,): those at the rule's bandwidth, or the
-            largest of half, rule and twice where they differ (`long_run.safe_deviations`).
-        by_bandwidth: at half, rule and twice the bandwidth.
+        robust: deviations with autocorrelation, shape (k,): at the rule's bandwidth, or the
+            largest at half, one and two times it if they differ (`long_run.safe_deviations`).
+        by_bandwidth: deviations at half, one and two times the rule's bandwidth.
         covariance: robust, shape (k, k), scaled so that its diagonal is `robust` squared.
         freedom: effective number of rows less coefficients.
         effective: effective number of rows.
         residuals: of each piece, shape (n,); zero in omitted rows.
-        count: number of rows without omitted ones.
+        count: number of rows that are not omitted.
         relative: norm of the residuals over norm of the force.
         condition: condition number of the unscaled columns.
-        likeness: condition number of the columns scaled to unit length, independent of units.
+        likeness: condition number of columns of unit length, independent of units.
         matters: size of each coefficient below which its force is negligible, shape (k,).
     """
 
@@ -84,7 +84,7 @@ class Regression:
 
     @property
     def quantile(self) -> float:
-        """Half-width of a 95 % interval over its deviation: Student's t, adjusted to bandwidth."""
+        """Half-width of a 95 % interval over the deviation: Student's t for the bandwidth."""
         share = min(1.0, max(each.lags for each in self.by_bandwidth) / self.count)
         grown: float = sum(c * share**i for i, c in enumerate(KIEFER))
         return float(student(max(self.freedom, 1.0)) * grown)
@@ -113,7 +113,7 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
     Least squares and instruments differ only in `inverse`.
     """
     k = design.shape[1]
-    n = int(np.count_nonzero(np.any(design != 0.0, axis=1)))  # the others are omitted
+    n = int(np.count_nonzero(np.any(design != 0.0, axis=1)))  # rows of zeros are omitted
     values = inverse @ force
     cuts = np.cumsum([len(piece.force) for piece in pieces])[:-1]
     residuals = tuple(np.split(force - design @ values, cuts))
@@ -146,7 +146,7 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
 
 
 def effective_count(residuals: Sequence[Array]) -> float:
-    """Effective sample size of the residuals, from pairs of lags up to the first negative pair.
+    """Effective sample size of the residuals, from pairs of lags before the first negative pair.
 
     Source: Geyer, Stat. Sci. 7 (1992), initial positive sequence.
     """

@@ -24,13 +24,13 @@ from campaign.estimation.inverse.terms import TERMS, Term, Terms, columns
 T = TypeVar("T")
 
 END_ROWS, END_PERIODS = 5, 3.0
-"""Rows, or periods of the low-pass, that are omitted at both ends; at most a tenth."""
+"""Rows, or periods of the low-pass, omitted at each end; at most a tenth of the rows."""
 
 
 def rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float = 0.0) -> Piece:
     """Columns (n, k) and force (n,) of a motion, the force `delay` (s) later than recorded.
 
-    Rows at standstill are zero, so that the others keep their places in time.
+    Rows at standstill are zero, so that the other rows keep their places in time.
     """
     piece = all_rows(motion, terms, filtering, delay)
     if filtering.slowest == 0.0:
@@ -40,7 +40,7 @@ def rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float =
 
 
 def all_rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float = 0.0) -> Piece:
-    """As `rows`, with those at standstill."""
+    """As `rows`, with the rows at standstill."""
     made = [_column(motion, term, filtering) for term in terms]
     force = late_force(motion, filtering)(delay)
     return Piece(np.column_stack(made), force, kept_times(motion, filtering))

@@ -1,9 +1,9 @@
 """Simulated motion of an inverse model under its recorded force or command.
 
-A model with a small force residual may still have a large error of motion. The simulation starts
-again and again from the measured state and continues under the recorded force; dry friction holds
-the axis where the force does not overcome it. If the commanded motion is known, the simulation is a
-closed loop that follows it. Then it depends on measured data only through the model's parameters.
+A model with a small force residual may still have a large error of motion. The simulation restarts
+at intervals from the measured state and continues under the recorded force. Dry friction holds the
+axis unless the force exceeds it. With a known commanded motion, the simulation is a closed loop
+that follows it. Then it depends on measured data only through the model's parameters.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LEAD = 1.0
 STEPS = 4.0
 """Fewest steps in the shortest time constant of a loop."""
 MOST_STEPS = 50
-"""Most steps in a sample: a loop that needs more is implausibly fast for this axis."""
+"""Largest number of steps per sample; a loop that needs more is implausibly fast."""
 FOLLOWS = 0.5
 """Least share of the force's variance that the commanded motion explains."""
 
@@ -39,7 +39,7 @@ class Loop:
 
     Attributes:
         stiffness, damping: force over error of position, and of rate.
-        ahead: the rest of the force, which depends on the commanded motion alone, shape (n,).
+        ahead: rest of the force, which depends only on the commanded motion, shape (n,).
         explained: share of the force's variance that the law explains.
     """
 
@@ -53,8 +53,7 @@ def find_loop(motion: Motion, wanted: Motion, low_pass: float) -> Loop:
     """Control law from force, motion and commanded motion, by least squares.
 
     The force has the same low-pass (Hz) as the motions. Terms of commanded position, rate and
-    direction represent integral action. Raises ValueError where the errors do not explain the
-    force.
+    direction represent integral action. Raises ValueError if the errors do not explain the force.
     """
     error, slower = wanted.position - motion.position, wanted.rate - motion.rate
     own = (error, slower, np.ones_like(error), wanted.position, wanted.rate, wanted.acceleration,
@@ -75,8 +74,8 @@ def find_loop(motion: Motion, wanted: Motion, low_pass: float) -> Loop:
 def driven_motion(motion: Motion, terms: Terms, values: Array, delay: float = 0.0) -> Motion:
     """Simulated motion of whole stretches under the recorded force.
 
-    values: of the terms, the first of which is the inertia. One integration step per sample, over
-    which the force is constant. Raises ValueError without a positive inertia or a whole stretch.
+    values: of the terms; the first is the inertia. Each sample is one integration step with a
+    constant force. Raises ValueError without a positive inertia or a whole stretch.
     """
     count, steps = _stretches(motion)
     force = later(motion.force, delay, motion.sample_rate)[: count * steps].reshape(count, steps)
@@ -154,16 +153,16 @@ def _going(
     place, rate, change = (np.empty((len(q), steps)) for _ in range(3))
     tiny = 1e-9 * max(float(np.abs(motion.rate).max()), 1e-300)
 
-    still, asked = np.zeros(len(q)), np.empty((len(q), len(terms) - 1))
+    still, forces = np.zeros(len(q)), np.empty((len(q), len(terms) - 1))
 
     def resisting(place: Array, at: Array, heat: Array | None) -> Array:
-        """Force of the model's other terms at a position and a rate, (count,)."""
+        """Force of the other terms at a position and a rate, shape (count,)."""
         if len(terms) == 1:
             return still
-        here = Motion(at, place, at, still, at, heat)
+        instant = Motion(at, place, at, still, at, heat)
         for column, term in enumerate(terms[1:]):
-            asked[:, column] = term.column(here)
-        return np.asarray(asked @ values[1:])
+            forces[:, column] = term.column(instant)
+        return np.asarray(forces @ values[1:])
 
     for k in range(steps):
         place[:, k], rate[:, k] = q, v
@@ -172,7 +171,7 @@ def _going(
             force = drive(k, q, v)
             held = np.abs(v) <= tiny
             going = v
-            if held.any():  # holding friction acts in both directions
+            if held.any():  # static friction acts in both directions
                 forward = resisting(q, np.full_like(v, tiny), heat)
                 backward = resisting(q, np.full_like(v, -tiny), heat)
                 sign = np.where(force > forward, 1.0, np.where(force < backward, -1.0, 0.0))
@@ -193,7 +192,7 @@ def relative_rate_error(
     """RMS of simulated less measured rate over RMS of the measured rate."""
     over, under = 0.0, 0.0
     for motion in motions:
-        # Negative friction, as by a wrong sign, diverges: infinite, without a warning.
+        # Negative friction, as by a wrong sign, diverges: the error is infinite, without a warning.
         with np.errstate(over="ignore", invalid="ignore"):
             rate = driven_motion(motion, terms, values, delay).rate
             over += float(np.sum((rate - motion.rate[: len(rate)]) ** 2))

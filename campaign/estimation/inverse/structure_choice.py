@@ -1,7 +1,7 @@
 """Choice of terms: cross-validation by blocks and an information criterion.
 
 A term that improves the criterion on the rows of a fit can increase the error on other rows.
-Therefore both must decrease: each further term must clearly lower the error on held-out blocks.
+Therefore both must decrease, and the error on held-out blocks must decrease clearly.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from campaign.estimation.inverse.terms import Term
 BLOCKS = 10
 """Blocks of consecutive rows, each held out once."""
 ALIKE = 300.0
-"""Condition number of columns of unit length above which two are almost equal in these motions."""
+"""Condition number of columns of unit length above which two columns are almost equal."""
 CLEARLY = 2.0
 """Paired standard errors over blocks by which a further term must lower the error."""
 
@@ -32,7 +32,7 @@ class Structure:
 
     Attributes:
         fit: on all rows.
-        held_out: norm of the error on held-out blocks, over that of the force.
+        held_out: norm of the error on held-out blocks over norm of the force.
         by_block: mean square error on each held-out block, shape (blocks,).
         criterion: Bayesian information criterion with the effective number of rows.
     """
@@ -58,10 +58,10 @@ def structure(
 ) -> Structure:
     """Fit these terms to all motions, and to all but each block.
 
-    effective: number of rows in the criterion; default: that of the fit. It must be the same in
-        criteria that are compared.
+    effective: number of rows in the criterion; default: that of the fit. Compared criteria must
+        have the same number.
 
-    Raises ValueError where columns are dependent, in all rows or without one block.
+    Raises ValueError if columns are dependent, in all rows or without one block.
     """
     pieces = [rows(motion, terms, filtering, delay) for motion in motions]
     fit = regress(pieces)
@@ -81,7 +81,7 @@ def criterion(fit: Regression, count: float) -> float:
 def held_out(pieces: Sequence[Piece]) -> tuple[Array, float]:
     """Squared error and rows of each held-out block, shape (blocks, 2); squared force.
 
-    By subtraction of the block from the normal equations of all rows, without a new regression.
+    The block is subtracted from the normal equations of all rows, without a new regression.
     """
     whole = sum(p.columns.T @ p.columns for p in pieces)
     right = sum(p.columns.T @ p.force for p in pieces)
@@ -106,9 +106,9 @@ def choose(
     filtering: FilterSettings,
     delay: float = 0.0,
 ) -> tuple[list[Structure], int]:
-    """Add groups of terms one by one to `start` while they lower the error on held-out blocks.
+    """Add groups of terms one by one to `start` while they lower held-out error and criterion.
 
-    At most one term of a family is added. Returns all tried structures, the start first, and the
+    At most one group of a family is added. Returns all tried structures, the start first, and the
     index of the chosen one.
     """
     tried = [structure(motions, start, filtering, delay)]
@@ -120,7 +120,7 @@ def choose(
             terms = (*tried[chosen].terms, *group)
             try:
                 larger.append((group, structure(motions, terms, filtering, delay, effective)))
-            except ValueError:  # these motions do not determine it
+            except ValueError:  # these motions do not determine the terms
                 continue
             if larger[-1][1].fit.likeness > ALIKE:
                 larger.pop()
@@ -142,7 +142,7 @@ def choose(
 
 
 def clearly_better(new: Structure, old: Structure) -> bool:
-    """Whether the mean square error on held-out blocks decreases by more than their scatter."""
+    """Whether mean square error on held-out blocks decreases by over `CLEARLY` standard errors."""
     gain = old.by_block - new.by_block
     error = float(np.std(gain, ddof=1)) / math.sqrt(len(gain)) if len(gain) > 1 else math.inf
     return float(np.mean(gain)) > CLEARLY * error

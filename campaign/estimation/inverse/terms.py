@@ -28,8 +28,8 @@ class Term:
         unit: of the coefficient (SI, rotary).
         meaning: one sentence.
         column: of shape (n,), from a motion before decimation.
-        family: terms of one family describe the same effect, and a model has at most one of them:
-            with two, neither coefficient has a meaning alone.
+        family: terms of one family describe the same effect. A model has at most one of them,
+            because with two neither coefficient has a meaning.
     """
 
     name: str
@@ -49,7 +49,7 @@ def _negative(motion: Motion) -> Array:
 
 
 WARM = 20.0
-"""Reference (degC) at which the terms over temperature are zero."""
+"""Reference temperature (degC), at which the terms over temperature are zero."""
 
 
 def _warmer(motion: Motion) -> Array:
@@ -94,7 +94,7 @@ ALL = (
          "How that change bends, as of a viscosity that falls exponentially.",
          lambda m: _warmer(m) ** 2 * m.rate),
 )  # fmt: skip
-"""Terms by their names; `periodic` returns those of a spatial period."""
+"""All terms except those of a spatial period, which `periodic` returns."""
 TERMS: Mapping[str, Term] = {term.name: term for term in ALL}
 SYMMETRIC = ("inertia", "viscous", "coulomb", "offset")
 DIRECTIONAL = (
@@ -104,7 +104,7 @@ DIRECTIONAL = (
     "coulomb_positive",
     "coulomb_negative",
 )
-"""Separate terms of both directions, without an offset, which depends on their difference."""
+"""Separate terms of both directions; an offset would be the difference of two of them."""
 
 
 def periodic(period: float) -> tuple[Term, ...]:

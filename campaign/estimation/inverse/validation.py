@@ -25,7 +25,7 @@ TOO_FEW_BLOCKS = Cause(
 
 @dataclass(frozen=True)
 class Prediction:
-    """Rows of a motion with the prediction of a model; shape (n,), forces in one unit."""
+    """Rows of a motion with the prediction of a model, shape (n,); forces in one unit."""
 
     time: Array
     force: Array
@@ -38,7 +38,7 @@ class Prediction:
 
     @property
     def relative(self) -> float:
-        """Norm of the residuals over that of the force."""
+        """Norm of the residuals over norm of the force."""
         return float(np.linalg.norm(self.residuals) / np.linalg.norm(self.force))
 
 
@@ -62,17 +62,17 @@ def _by_blocks(name: str, sides: tuple[Prediction, ...]) -> Estimate:
         shares = [np.sqrt(each[rows].sum(-1) / norm[rows].sum(-1)) for each in squares]
         return np.asarray(shares[0] if len(shares) == 1 else shares[0] - shares[1])
 
-    here = float(value(np.arange(count)))
+    point = float(value(np.arange(count)))
     correlated = count / min(effective_count((each - each.mean(),)) for each in squares)
     length = max(1, math.ceil(max(2.0 * correlated, count ** (1.0 / 3.0))))
     blocks = count // length
     method = f"{REPEATS} resamplings of {blocks} blocks of {length} rows"
     if blocks < FEWEST_BLOCKS:
         reason = TOO_FEW_BLOCKS(blocks=blocks)
-        return Estimate.without_interval(name, here, "", reason, method=method)
+        return Estimate.without_interval(name, point, "", reason, method=method)
     random = np.random.Generator(np.random.PCG64(SEED))
     starts = random.integers(0, count, (REPEATS, blocks, 1))
     rows = (starts + np.arange(length)).reshape(REPEATS, -1) % count
     low, high = np.quantile(value(rows), (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))
-    low, high = min(float(low), here), max(float(high), here)
-    return Estimate(name, here, "", low, high, LEVEL, method)
+    low, high = min(float(low), point), max(float(high), point)
+    return Estimate(name, point, "", low, high, LEVEL, method)

@@ -22,10 +22,10 @@ class Channel:
         name: `rate` or `angle`.
         samples: measured (rad/s or rad), 0 for missing ones, shape (n,).
         kept: mask of the valid samples.
-        there: 1 for valid whitened samples, otherwise 0, shape (n,).
+        there: mask of the valid whitened samples, 1 or 0, shape (n,).
         basis: orthonormal columns of whitened offset and drift, shape (n, q).
-        deviation: of its whitened residuals (rad/s or rad).
-        whitening: 1, -a1, -a2, ... of the autoregression of its noise.
+        deviation: standard deviation of its whitened residuals (rad/s or rad).
+        whitening: filter 1, -a1, -a2, ... of the autoregression of its noise.
     """
 
     name: str
@@ -40,18 +40,18 @@ class Channel:
     def of(
         cls, name: str, samples: Array, kept: Flags, deviation: float, whitening: Array
     ) -> Channel:
-        """Channel with derived attributes; a sample after a missing one cannot be whitened."""
-        there = kept.copy()
+        """Channel with derived attributes; samples after a missing one cannot be whitened."""
+        valid = kept.copy()
         for lag in range(1, len(whitening)):
-            there[lag:] &= kept[:-lag]
+            valid[lag:] &= kept[:-lag]
         # The past of the first samples is unknown, not 0.
-        there[: len(whitening) - 1] = False
+        valid[: len(whitening) - 1] = False
         powers = np.vander(np.linspace(-1.0, 1.0, len(kept)), DRIFT[name])
-        basis = np.linalg.qr(filtered(powers, whitening) * there[:, None])[0]
-        return cls(name, samples, kept, there.astype(float), basis, deviation, whitening)
+        basis = np.linalg.qr(filtered(powers, whitening) * valid[:, None])[0]
+        return cls(name, samples, kept, valid.astype(float), basis, deviation, whitening)
 
     def left(self, values: Array) -> Array:
-        """Values (n, ...) whitened, without offset and drift, in deviations."""
+        """Whitened values (n, ...) without offset and drift, over `deviation`."""
         shown = (filtered(values, self.whitening).T * self.there).T
         return np.asarray((shown - self.basis @ (self.basis.T @ shown)) / self.deviation)
 
@@ -66,13 +66,13 @@ def filtered(values: Array, whitening: Array) -> Array:
 
 
 def white_noise(samples: Array) -> float:
-    """Deviation of white noise on a smooth signal, by second differences; never 0."""
+    """Standard deviation of white noise on a smooth signal, by second differences; above 0."""
     rough = float(np.std(np.diff(samples, 2))) / np.sqrt(6.0)
     return float(max(rough, 1e-4 * np.std(samples), np.finfo(float).tiny))
 
 
 def autoregression(residuals: Array) -> Array:
-    """Whitening filter 1, -a1, ... of residuals (n,), by the Levinson-Durbin recursion."""
+    """Whitening filter 1, -a1, ... of residuals (n,), by Levinson-Durbin and Akaike's criterion."""
     count = len(residuals)
     most = min(MOST_ORDER, count // 20)
     covariance = np.array([residuals[lag:] @ residuals[: count - lag] for lag in range(most + 1)])

@@ -1,9 +1,9 @@
 """Joint output-error fit of a plant below breakaway to the records of several trials.
 
-The fit minimizes the error of the simulated answer, not an equation error: then noise of rate and
-angle causes no bias (Ljung, "System Identification", 2nd ed., section 7.2). The rate is compared as
-a rate, so that the gyro's noise is not integrated. Offset and slow drift of the gyro and the
-encoder's offset are linear; each record's residuals and Jacobian are projected to exclude them.
+The fit minimizes the error of the simulated response, not an equation error. Therefore noise of
+rate and angle causes no bias (Ljung, "System Identification", 2nd ed., section 7.2). The rate is
+compared as a rate, so that the gyro's noise is not integrated. Offset and drift of the gyro and the
+encoder's offset are linear: a projection of each record's residuals and Jacobian excludes them.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from campaign.estimation.presliding_dynamics.record import Assumptions, Record, 
 from campaign.estimation.presliding_dynamics.start import first_plant
 
 EVALUATIONS = 60
-"""Most evaluations from a start; a fit that needs more has not converged."""
+"""Largest number of evaluations from a start; a fit that needs more has not converged."""
 FEW = 8
-"""Most evaluations with one parameter fixed near the best fit."""
+"""Largest number of evaluations with one parameter fixed near the best fit."""
 TOLERANCE = 1e-8
-"""Relative change of the sum of squares at which a search ends: for 1e5 samples a thousandth of the
-change by one deviation of a parameter."""
+"""Relative change of the sum of squares at which a search ends. For 1e5 samples this is 1/1000 of
+the change by one deviation of a parameter."""
 
 
 def fit_presliding_dynamics(
@@ -48,7 +48,7 @@ def fit_presliding_dynamics(
 ) -> JointFit:
     """Fit sigma0, sigma1, J and the other free parameters to all records at once.
 
-    Raises ValueError with the reason where there is no start, or no start can be simulated.
+    Raises ValueError, with the reason, if no start exists or none can be simulated.
     """
     best = search(_reweighted(with_doubts(first_fit(records, assumed))))
     return with_slopes(search(_reweighted(centred(best))))
@@ -57,7 +57,7 @@ def fit_presliding_dynamics(
 def first_fit(records: Sequence[Record], assumed: Assumptions | None = None) -> JointFit:
     """First fit, with the given torques and without slopes: sufficient to simulate the motion.
 
-    The search begins at a linear fit of the spectra. Raises as `fit_presliding_dynamics`.
+    The search starts from a linear fit of the spectra. Raises as `fit_presliding_dynamics`.
     """
     if not records:
         raise ValueError("there is no record to fit")
@@ -82,7 +82,7 @@ def first_fit(records: Sequence[Record], assumed: Assumptions | None = None) -> 
 
 
 def _starts(begin: Plant) -> list[Plant]:
-    """Start plants: the first one; then, if that fails, linear springs with more damping."""
+    """Start plants: the first one, and for its failure a linear spring with more damping."""
     bristles = begin.bristles[0]
     other: Bristles = replace(bristles, compliance=0.0, damping=2.0 * bristles.damping)
     return [begin, replace(begin, bristles=(other,))]
@@ -92,7 +92,7 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumptions) -> 
     parameters = Parameters.of(records, first, assumed)
     priors = np.zeros(parameters.size)
     priors[len(parameters.names) :] = 1.0
-    # The only prior knowledge: it is of the order of critical damping.
+    # The only prior knowledge: viscous friction is of the order of critical damping.
     priors[parameters.names.index("viscous_friction")] = 1.0
     grids = tuple(Grid.of(record, first) for record in records)
     channels = tuple(
@@ -102,7 +102,7 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumptions) -> 
         )
         for record in records
     )
-    # The first search uses the given torque: free torque errors would fit a wrong plant.
+    # The first search uses the given torque, because free torque errors would fit a wrong plant.
     answers = tuple(
         np.zeros((len(each), *record.doubts.shape))
         for each, record in zip(channels, records, strict=True)
@@ -125,9 +125,9 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumptions) -> 
 
 
 def search(fit: JointFit, held: int | None = None) -> JointFit:
-    """Minimize the sum of squares from the vector of `fit`, with one parameter fixed (`held`).
+    """Minimize the sum of squares from the vector of `fit`; `held`: index of a fixed parameter.
 
-    Raises ValueError when the start cannot be simulated.
+    Raises ValueError if the start cannot be simulated.
     """
     from scipy.optimize import least_squares
 
@@ -137,7 +137,7 @@ def search(fit: JointFit, held: int | None = None) -> JointFit:
     priors = np.setdiff1d(np.flatnonzero(fit.priors), left)
     free = np.delete(np.arange(fit.parameters.size), left + ([] if held is None else [held]))
     low, high = fit.parameters.bounds()
-    # Torque errors are linear: their best factors follow from the rest of the vector.
+    # Torque errors are linear: the rest of the vector determines their best factors.
     pairs = [zip(c, d, strict=True) for c, d in zip(fit.channels, fit.doubt_answers, strict=True)]
     columns = np.concatenate([c.left(each) for pair in pairs for c, each in pair])
     solved = np.linalg.inv(columns.T @ columns + np.eye(len(left)))
@@ -148,7 +148,7 @@ def search(fit: JointFit, held: int | None = None) -> JointFit:
         return vector
 
     def moved(misses: Array) -> Array:
-        """Change of the factors of torque errors from `taken`, for the residuals with `taken`."""
+        """Change of the factors of torque errors from `taken`, from the residuals with `taken`."""
         return np.asarray(-solved @ (columns.T @ misses + fit.taken))
 
     def missed(part: Array) -> Array:
@@ -202,19 +202,19 @@ def _reweighted(fit: JointFit) -> JointFit:
 def whitened(fit: JointFit) -> JointFit:
     """Repeat the fit with an autoregression as the noise of each channel.
 
-    Akaike's criterion selects its order; its coefficients follow from the autocorrelation of the
-    residuals (Yule and Walker). White noise stays white.
+    Akaike's criterion selects its order. Its coefficients follow from the autocorrelation of the
+    residuals (Yule and Walker). White noise remains white.
     """
     first = search(_with_noise(centred(fit), autoregression))
     return with_slopes(search(centred(_reweighted(first))))
 
 
 def _with_noise(fit: JointFit, whitening: Callable[[Array], Array]) -> JointFit:
-    """Set the noise of all records, which have the same sensors, to the median of theirs.
+    """Set the noise of each sensor to that of its median record, for all records.
 
-    Otherwise a record with a model error would count as noisy, and hide the error.
+    Otherwise a record with a model error would count as noisy and hide the error.
     """
-    seen: dict[str, list[tuple[float, Array]]] = {}
+    by_channel: dict[str, list[tuple[float, Array]]] = {}
     for group, residuals in zip(fit.channels, fit.residuals, strict=True):
         for channel, left in zip(group, residuals, strict=True):
             own = whitening(left)
@@ -224,10 +224,10 @@ def _with_noise(fit: JointFit, whitening: Callable[[Array], Array]) -> JointFit:
             least = 1e-9 * float(np.std(channel.samples))
             # The new filter follows the previous whitening.
             whole = np.convolve(channel.whitening, own)
-            seen.setdefault(channel.name, []).append((max(deviation, least), whole))
+            by_channel.setdefault(channel.name, []).append((max(deviation, least), whole))
     noise = {
         name: sorted(pairs, key=lambda pair: pair[0])[(len(pairs) - 1) // 2]
-        for name, pairs in seen.items()
+        for name, pairs in by_channel.items()
     }
     channels = tuple(
         tuple(Channel.of(c.name, c.samples, c.kept, *noise[c.name]) for c in group)

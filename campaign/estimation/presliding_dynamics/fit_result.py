@@ -19,9 +19,9 @@ from campaign.estimation.presliding_dynamics.simulation import (
 )
 
 DIFFERENCE = 1e-6
-"""Step of the Jacobian's differences, in the vector's units."""
+"""Difference for the Jacobian, in the vector's units."""
 DELAYS = (("rate_delay",), ("angle_delay",))
-"""Parameters that do not change the motion, only its samples."""
+"""Parameters that change only the samples of a motion, not the motion."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Grid:
 
     @classmethod
     def of(cls, record: Record, plant: Plant) -> Grid:
-        """Grid that is fine enough for a plant."""
+        """Grid with steps fine enough for a plant."""
         count = steps_per_sample(plant, record.step, record.highest_frequency())
         return cls(torque_on_grid(record.torque, count), count)
 
@@ -55,13 +55,14 @@ class JointFit:
         grids: torque of each record, on its grid.
         doubt_answers: response of the channels of each record to the error columns of its torque,
             shape (channels, n, m).
-        taken: the factors of those columns that `grids` include, shape (m,).
+        taken: factors of these columns that `grids` already include, shape (m,).
         residuals: of each record: measured less simulated, without offset and drift, in
             deviations, shape (channels, n).
-        jacobians: derivatives of simulated samples by the vector, likewise, (channels, n, size).
+        jacobians: of each record: derivatives of the simulated samples by the vector, likewise,
+            shape (channels, n, size).
         priors: derivatives of the prior terms, mainly of the records' own parameters, (size,).
         cost: sum of squares, priors included.
-        reached: whether the search ended in a minimum.
+        reached: whether the search ended at a minimum.
     """
 
     records: tuple[Record, ...]
@@ -118,17 +119,17 @@ def with_slopes(fit: JointFit) -> JointFit:
 def with_doubts(fit: JointFit) -> JointFit:
     """Add the torque of the best fit and the plant's response to errors of the torque.
 
-    These errors are small, so that the response is linear.
+    These errors are small; the response to them is linear.
     """
     fit, responses = centred(fit), []
     for number, record in enumerate(fit.records):
-        here = _answers(fit, number, fit.vector)
-        answers = np.zeros((*here.shape, record.doubts.shape[1]))
+        base = _answers(fit, number, fit.vector)
+        answers = np.zeros((*base.shape, record.doubts.shape[1]))
         for index, column in enumerate(record.doubts.T):
             pushed = with_torque(
                 fit, number, fit.grids[number].torque + _on_grid(fit, number, column)
             )
-            answers[:, :, index] = _answers(pushed, number, fit.vector) - here
+            answers[:, :, index] = _answers(pushed, number, fit.vector) - base
         responses.append(answers)
     return replace(fit, doubt_answers=tuple(responses))
 
@@ -197,8 +198,8 @@ def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
     """Jacobian of the simulated samples, in deviations, (channels, n, size), by differences."""
     parameters, channels = fit.parameters, fit.channels[number]
     own = parameters.of_record(number)
-    here = _motion(fit, number, vector)
-    answers = _seen(fit, number, here, vector)
+    base = _motion(fit, number, vector)
+    answers = _seen(fit, number, base, vector)
     slopes = np.zeros((len(channels), len(fit.records[number].torque), len(vector)))
     doubts = zip(channels, fit.doubt_answers[number], strict=True)
     slopes[:, :, parameters.doubted] = [c.left(each) for c, each in doubts]
@@ -206,7 +207,7 @@ def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
         moved = vector.copy()
         moved[index] += DIFFERENCE
         delay = parameters.names[index : index + 1] in DELAYS
-        motion = here if delay else _motion(fit, number, moved)
+        motion = base if delay else _motion(fit, number, moved)
         slope = (_seen(fit, number, motion, moved) - answers) / DIFFERENCE
         slopes[:, :, index] = [c.left(each) for c, each in zip(channels, slope, strict=True)]
     return slopes
@@ -215,7 +216,7 @@ def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
 def unexplained(fit: JointFit, record: Record) -> float:
     """Rms residual of another record with the fitted plant, over the rms of its motion.
 
-    For its first channel, without offset and drift in both. Nothing else is fitted.
+    Both are of its first channel, without offset and drift. No other parameter is fitted.
     """
     grid = Grid.of(record, fit.plant)
     channels = tuple(
@@ -235,5 +236,5 @@ def unexplained(fit: JointFit, record: Record) -> float:
         doubt_answers=(np.zeros((len(channels), len(record.torque), 0)),),
     )
     first, answer = channels[0], other.answers(0)[0]
-    missed = first.left(first.samples - answer)
-    return float(np.linalg.norm(missed) / np.linalg.norm(first.left(first.samples)))
+    residual = first.left(first.samples - answer)
+    return float(np.linalg.norm(residual) / np.linalg.norm(first.left(first.samples)))

@@ -1,9 +1,8 @@
 """The parameters of the joint fit as one vector, and back.
 
-Order: the shared parameters, the factors of torque errors common to all records, then the own
-parameters of each record.
-Stiffness and inertia are logarithms, so that they and their intervals stay positive. Damping, which
-may be zero, is linear: a negative value is possible and visible. All are scaled to order one.
+Order: shared parameters, factors of the torque errors common to all records, own parameters of each
+record. Stiffness and inertia are logarithms, so that they and their intervals remain positive.
+Damping may be zero and is linear: a negative value is possible and visible. All are of order one.
 """
 
 from __future__ import annotations
@@ -26,25 +25,25 @@ BOUNDS = {
     "rate_delay": (-20.0, 20.0),
     "angle_delay": (-20.0, 20.0),
 }
-"""Bounds of other parameters: damping over critical damping; largest torque over the slip torque of
-the bristles (above 1 the load breaks away); delay of a channel in samples."""
+"""Bounds of other parameters: damping over critical damping; largest torque over slip torque of the
+bristles (above 1 the load breaks away); delay of a channel in samples."""
 LARGEST_OFFSET = 1.0
 """Prior standard deviation of a load torque besides the drive, over the largest torque."""
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """Layout and scale of the vector: shared parameters, then those of each record.
+    """Layout and scale of the vector.
 
     Attributes:
         names: of the shared ones; `damping` is the sum of sigma1 and sigma2, which the records
             determine well.
         first: plant for the scales.
-        step: sampling step, the scale of delays (s).
+        step: shortest sampling step, the scale of delays (s).
         torque: scale of yielding (N m), the largest torque of all records.
         factors: number of factors of torque errors, common to all records.
-        own: number of parameters of each record: offset of the torque; also bristle torque and rate
-            at the beginning of a record that does not begin at rest.
+        own: number of parameters of each record: offset of the torque; for a record that does not
+            begin at rest also its initial bristle torque and rate.
     """
 
     names: tuple[str, ...]
@@ -117,7 +116,7 @@ class Parameters:
         return 2.0 * float(np.sqrt(self.first.stiffness * self.first.inertia))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Wide bounds of the search for the vector; a value at a bound is no result."""
+        """Wide bounds of the vector in a search; a value at a bound is not a result."""
         low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         start = self.start()
         for index, name in enumerate(self.names):
@@ -146,14 +145,14 @@ class Parameters:
         return Plant(float(np.exp(values["inertia"])), (bristles,), viscous, part)
 
     def delay(self, vector: Array, channel: str) -> float:
-        """Delay of a channel after the torque (s); 0 for one that no record of the fit has."""
+        """Delay of a channel after the torque (s); 0 if no record of the fit has this channel."""
         name = f"{channel}_delay"
         if name not in self.names:
             return 0.0
         return float(vector[self.names.index(name)]) * self.step
 
     def in_units(self, name: str, value: float) -> tuple[float, float]:
-        """Value of a parameter (SI) from that in the vector, and its derivative by the latter."""
+        """Value (SI) of a parameter from its value in the vector, and derivative by the latter."""
         if name in LOGARITHMIC:
             return float(np.exp(value)), float(np.exp(value))
         scale = {

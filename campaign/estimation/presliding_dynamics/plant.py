@@ -4,7 +4,7 @@
     dz/dt = v - sigma0 |v| z / s(v),    s(v) = Ts (c + (1 - c) exp(-(|v| / vs)^delta)), c = Tc / Ts
 
 LuGre friction (Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Autom. Control 40, 1995),
-of one or several interfaces that are bent by the same angle.
+of one or several interfaces with a common angle.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Bristles:
     Attributes:
         stiffness: sigma0 (N m/rad).
         damping: sigma1 (N m s/rad).
-        compliance: 1 / Ts (1/(N m)), the yielding of the bristles; 0: a linear spring.
+        compliance: 1 / Ts (1/(N m)), yielding of the bristles; 0: linear spring.
         coulomb_share: c = Tc / Ts.
         stribeck_velocity: vs (rad/s); infinite: s does not depend on the rate.
         stribeck_exponent: delta.
@@ -40,9 +40,9 @@ class Appendage:
     """An elastic part of the load, without a sensor.
 
     Attributes:
-        inertia: its own, a part of the plant's (kg m^2).
+        inertia: of this part, included in that of the plant (kg m^2).
         frequency: natural frequency with a fixed load (Hz).
-        damping_ratio: of that mode.
+        damping_ratio: of this mode.
     """
 
     inertia: float
@@ -57,8 +57,8 @@ class Plant:
     Attributes:
         inertia: J, appendage included (kg m^2).
         bristles: its friction interfaces.
-        viscous: sigma2 of all of them (N m s/rad).
-        appendage: an elastic part, or none.
+        viscous: sigma2 of all interfaces (N m s/rad).
+        appendage: elastic part; None: without.
     """
 
     inertia: float

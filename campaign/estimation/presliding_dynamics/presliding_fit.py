@@ -49,7 +49,7 @@ POSITIVE = ("damping", "viscous_friction", "appendage_damping_ratio")
 UNSCALED = ("rate_delay", "angle_delay", "yielding")
 """Parameters to which a model error does not add a part proportional to their size."""
 PROFILED = ("bristle_stiffness", "damping", "inertia")
-"""Parameters with limits along the profile where an interval is wide."""
+"""Parameters whose wide intervals end at limits of the profile."""
 SLIPPING = 0.95
 """Bristle torque over the fitted slip torque above which a load breaks away."""
 NO_MINIMUM = Cause("no minimum", "the search did not end in a minimum")
@@ -69,10 +69,10 @@ class PreslidingDynamics:
 
     Attributes:
         estimates: by name, all free parameters of `UNITS`, where `damping` is the sum of sigma1
-            and sigma2; with derived ones: `bristle_damping` sigma1 (N m s/rad), `damping_ratio` of
+            and sigma2; also the derived `bristle_damping` sigma1 (N m s/rad), `damping_ratio` of
             the sum, and `natural_frequency` (Hz).
         fit, spread, misfit: basis of the estimates.
-        reason: common reason for no interval; `NONE` where each estimate has its own.
+        reason: common reason for no interval; `NONE`: each estimate has its own.
     """
 
     estimates: dict[str, Estimate]
@@ -87,9 +87,9 @@ def identify_presliding_dynamics(
 ) -> PreslidingDynamics:
     """Stiffness and damping of the bristles and inertia from all records at once.
 
-    An estimate is *not determined* where its interval is wide, or the parameter is at its bound.
-    No estimate has an interval where one inertia on one bristle does not describe the records.
-    Raises ValueError with the reason where there is no fit.
+    An estimate is *not determined* if its interval is wide, or the parameter is at its bound. No
+    estimate has an interval if one inertia on one bristle does not describe the records, a load
+    breaks away, or the search found no minimum. Raises ValueError, with the reason, for no fit.
     """
     plain = fit_presliding_dynamics(records, assumed)
     fit = whitened(plain)
@@ -125,15 +125,15 @@ def _without(fit: JointFit, index: int, reason: Reason) -> Estimate:
 
 
 def _estimate(fit: JointFit, spread: Spread, misfit: Misfit, index: int) -> Estimate:
-    """Estimate of one shared parameter, with limits along the profile where that is curved."""
-    name, here = fit.parameters.names[index], float(fit.vector[index])
-    value, scale = fit.parameters.in_units(name, here)
+    """Estimate of one shared parameter; its limits are those of the profile if that is curved."""
+    name, entry = fit.parameters.names[index], float(fit.vector[index])
+    value, scale = fit.parameters.in_units(name, entry)
     freedom, deviation = float(spread.freedom[index]), float(spread.deviation[index])
     quantile = student(freedom)
     if name in LOGARITHMIC and quantile * deviation > WIDEST:
         return replace(_without(fit, index, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
-    ends = [here + sign * quantile * deviation for sign in (-1.0, 1.0)]
-    size = 1.0 if name in LOGARITHMIC else abs(here)
+    ends = [entry + sign * quantile * deviation for sign in (-1.0, 1.0)]
+    size = 1.0 if name in LOGARITHMIC else abs(entry)
     if name in PROFILED and CURVED * size < deviation < size:
         try:
             ends = [profile_end(fit, spread, index, quantile, sign) for sign in (-1.0, 1.0)]
@@ -161,7 +161,7 @@ def _estimate(fit: JointFit, spread: Spread, misfit: Misfit, index: int) -> Esti
 
 
 def _shifted(estimate: Estimate, shift: float) -> Estimate:
-    """Add a rectangular part with the shift by other shapes as half-width (GUM 4.3.7)."""
+    """Add a rectangular part whose half-width is the shift by other shapes (GUM 4.3.7)."""
     if not shift:
         return estimate
     return shifted_by(estimate, "shape of the bristles' curve", abs(shift) / math.sqrt(3.0))
@@ -170,7 +170,7 @@ def _shifted(estimate: Estimate, shift: float) -> Estimate:
 def _missed(estimate: Estimate, misfit: Misfit) -> Estimate:
     """Add a part for a significant model error that is too small for a misfit.
 
-    A relative error of the answer may cause the same relative error of a number.
+    A relative error of the response may cause the same relative error of a parameter.
     """
     share = misfit.band_share
     if misfit.band_chance >= SURELY or not share or estimate.name in UNSCALED:

@@ -12,28 +12,27 @@ from campaign.estimation.presliding_dynamics.plant import Appendage
 FEWEST = 100
 """Fewest samples of a record for an estimate of its noise."""
 FEWEST_PER_PERIOD = 20
-"""Fewest samples of a period for an estimate of the scatter of its errors."""
+"""Fewest samples per period for an estimate of the scatter of periodic errors."""
 ALIKE = 0.9
 """Autocorrelation above which a torque counts as periodic."""
 MOST = 0.999
-"""Share of the power that determines the highest frequency; higher ones are negligible."""
+"""Share of the power up to the highest frequency; higher frequencies are negligible."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """Torque and motion of one trial, evenly sampled from its beginning on.
+    """Torque and motion of one trial, evenly sampled from its start.
 
     Attributes:
         step: between samples (s).
         torque: at the load (N m), shape (n,).
         rate: of the load, by a gyro (rad/s), shape (n,); NaN for a missing sample; or None.
-        angle: of the load, by an encoder (rad), shape (n,), likewise.
-        at_rest: whether it begins at rest, so that the bristles carry the first torque; otherwise
-            bristle torque and rate at the beginning are free.
+        angle: of the load, by an encoder (rad), likewise.
+        at_rest: whether it begins at rest, where the bristles carry the first torque; otherwise
+            initial bristle torque and rate are free.
         doubt: columns of torque errors (N m), shape (n, m), each with a standard normal factor that
             is common to all records; None: no error.
-        period: of the torque (s); None: detected. A quantized channel has the same errors in each
-            period.
+        period: of the torque (s); None: detected. Errors of a quantized channel repeat in it.
         label: name in messages.
     """
 
@@ -72,7 +71,7 @@ class Record:
         return np.zeros((len(self.torque), 0)) if self.doubt is None else self.doubt
 
     def with_doubts(self, count: int) -> Record:
-        """Record with additional columns of 0, up to `count` columns."""
+        """Record with columns of 0 added, up to `count` columns."""
         more = np.zeros((len(self.torque), count - self.doubts.shape[1]))
         return replace(self, doubt=np.column_stack([self.doubts, more]))
 
@@ -89,7 +88,7 @@ class Record:
     def highest_frequency(self) -> float:
         """Frequency (Hz) below which the share `MOST` of the effective torque lies.
 
-        From the product of the spectra of torque and motion, which excludes noise of either.
+        The product of the spectra of torque and motion excludes noise of either.
         """
         answer = self.rate if self.rate is not None else np.gradient(np.asarray(self.angle))
         torque = np.fft.rfft(self.torque - np.mean(self.torque))
@@ -114,7 +113,7 @@ class Record:
         again = again[again > apart[0]] if len(apart) else again[:0]
         if not len(again):
             return None
-        # The maximum in the first range of lags with a large autocorrelation.
+        # The period is the maximum in the first range of lags with a large autocorrelation.
         breaks = np.flatnonzero(np.diff(again) > 1)
         first = again[: breaks[0] + 1] if len(breaks) else again
         period = int(first[np.argmax(alike[first])])
@@ -142,9 +141,9 @@ class Assumptions:
 
     Attributes:
         viscous: start value of sigma2 (N m s/rad). Below breakaway almost only the sum of sigma1
-            and sigma2 has an effect, so that each alone is seldom determined.
-        appendage: an elastic part, or its start values.
-        appendage_free: whether its frequency, inertia and damping are fitted, too.
+            and sigma2 has an effect; the records seldom determine each alone.
+        appendage: an elastic part; with `appendage_free` its start values.
+        appendage_free: whether its frequency, inertia and damping are also fitted.
     """
 
     viscous: float = 0.0

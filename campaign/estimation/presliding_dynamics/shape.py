@@ -1,11 +1,11 @@
 """Test whether one inertia on one bristle explains the records down to noise.
 
-Two tests of the residuals, neither of which mistakes colored noise for a model error. The first
-compares them with the simulated answer, band by band (an elastic part, a second inertia, a wrong
+There are two tests of the residuals. Neither takes colored noise for a model error. The first
+compares them with the simulated response, band by band (an elastic part, a second inertia, a wrong
 delay). The second compares them with the effect of other bristles: several interfaces that slip
 at different angles, a falling friction curve, nonlinear springs. Both are score tests (Rao; White,
-Econometrica 50, 1982), with the covariance of autocorrelated scores. The shift of the parameters
-is the step to a model that has these terms.
+Econometrica 50, 1982) with the covariance of autocorrelated scores. The shift of the parameters is
+the step to a model with these terms.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from campaign.estimation.presliding_dynamics.plant import Bristles
 from campaign.reason import NONE, Cause, Reason
 
 BANDS = 10
-"""Number of frequency bands of the answer, evenly spaced in the logarithm."""
+"""Number of frequency bands of the response, evenly spaced in the logarithm."""
 FAINT = 1e-3
-"""Share of the answer's power below the lowest and above the highest band."""
+"""Share of the response's power below the lowest and above the highest band."""
 SLIP_APART = 0.8
 """Relative change of the slip angles of the two halves of a bristle, one up and one down."""
 PUSH = 0.02
-"""Scale of an additional force, for a finite difference of the answer."""
+"""Scale of an additional force, for a finite difference of the response."""
 SURELY = 1e-4
-"""p value below which the residuals are a model error, not noise."""
+"""p value below which the residuals contain a model error, not only noise."""
 LIKELY = 0.01
 """p value below which the shift by other shapes is a part of the uncertainty."""
 LARGE = 0.02
-"""Share of the answer above which a model error prevents intervals."""
+"""Share of the response above which a model error prevents intervals."""
 NOISE = 2.0
-"""Factor of the part explained by noise, subtracted from the part that columns explain: the noise
-level is seldom known better."""
+"""Multiple of the part that noise explains, subtracted from the part that columns explain. The
+noise level is seldom known better."""
 ALIKE = 1e-8
 """Least share of a column that is independent of the parameters' columns."""
 
@@ -62,7 +62,7 @@ SHAPE_MISSED = Cause(
 
 @dataclass(frozen=True)
 class Band:
-    """Residual over simulated answer in a band: in phase (real), a quarter turn ahead (imag)."""
+    """Residual over simulated response in a band: in phase (real), 90° ahead (imaginary)."""
 
     frequency: float
     error: complex
@@ -74,12 +74,12 @@ class Misfit:
 
     Attributes:
         bands: gain error by frequency.
-        band_share: rms of the part explained by the bands over that of the answer.
-        band_chance: p value of noise as the only cause of that part.
+        band_share: rms of the part that the bands explain over rms of the response.
+        band_chance: p value of noise as the only cause of this part.
         shape_share, shape_chance: the same for other shapes of the bristles.
-        shape: the one of `SHAPES` that alone explains most.
-        shift: of the shared parameters with other shapes, in the vector's units, shape (k,); 0
-            where noise also explains the residuals.
+        shape: shape of `SHAPES` that alone explains the largest part.
+        shift: of the shared parameters with other shapes, in the vector's units, shape (k,); 0 if
+            noise also explains the residuals.
     """
 
     bands: tuple[Band, ...]
@@ -92,7 +92,7 @@ class Misfit:
 
     @property
     def reason(self) -> Reason:
-        """Reason why the fit has no intervals; `NONE` where it has."""
+        """Reason for no intervals of the fit; `NONE` if it has intervals."""
         if self.band_chance < SURELY and self.band_share > LARGE:
             worst = max(self.bands, key=lambda band: abs(band.error))
             return ANSWER_MISSED(share_percent=100 * self.band_share, frequency=worst.frequency)
@@ -104,8 +104,8 @@ class Misfit:
 def misfit_of(plain: JointFit, whitened: JointFit) -> Misfit:
     """Both tests on the residuals of a fit, plain and whitened.
 
-    Plain residuals determine the size of a model error: an autoregression would absorb much of it
-    as noise. The larger p value of both decides: short records need the whitened residuals.
+    Plain residuals determine the size of a model error, because an autoregression absorbs much of
+    it as noise. The larger p value decides, because short records need the whitened residuals.
     """
     misfit, other = _misfit_of(plain), _misfit_of(whitened)
     shape_chance = max(misfit.shape_chance, other.shape_chance)
@@ -140,7 +140,7 @@ def _misfit_of(fit: JointFit) -> Misfit:
 
 
 def _answers(fit: JointFit) -> list[Array]:
-    """Simulated answers without offset and drift, in deviations, shape (channels, n)."""
+    """Simulated responses without offset and drift, in deviations, shape (channels, n)."""
     return [
         np.array([c.left(answer) for c, answer in zip(group, fit.answers(number), strict=True)])
         for number, group in enumerate(fit.channels)
@@ -148,7 +148,7 @@ def _answers(fit: JointFit) -> list[Array]:
 
 
 def _band_columns(fit: JointFit) -> tuple[list[float], list[Array]]:
-    """Middle of each band (Hz), and the answer in it, in phase and a quarter turn ahead."""
+    """Center of each band (Hz); response in each band, in phase and 90° ahead."""
     answers = _answers(fit)
     low, high = np.inf, 0.0
     for record, answer in zip(fit.records, answers, strict=True):
@@ -172,10 +172,10 @@ def _band_columns(fit: JointFit) -> tuple[list[float], list[Array]]:
 
 
 def _shape_columns(fit: JointFit) -> list[Array]:
-    """Change of the simulated answer by each of `SHAPES`, in deviations."""
+    """Change of the simulated response by each of `SHAPES`, in deviations."""
     plant, changes = fit.plant, []
     bristles = plant.bristles[0]
-    # The same force at every amplitude: otherwise larger records would add no information.
+    # The force is common to all amplitudes: otherwise larger records would add no information.
     force = fit.parameters.torque
     fastest = max(float(np.max(np.abs(fit.motion(n).rate))) for n in range(len(fit.records)))
     for number, group in enumerate(fit.channels):
@@ -214,15 +214,15 @@ def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
 
 
 def _pushed(fit: JointFit, number: int, force: Array) -> Array:
-    """Answer with an additional force on the load, shape (steps + 1,)."""
+    """Response with `PUSH` times an additional friction force on the load, (steps + 1,)."""
     middle = 0.5 * (force[:-1] + force[1:])
     more = PUSH * np.column_stack([force[:-1], middle, force[1:]])
     return with_torque(fit, number, fit.grids[number].torque - more).answers(number)
 
 
 def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, float, float]:
-    """Shift of the parameters in a model with additional columns; p value of these columns; sum of
-    squares that they explain beyond noise.
+    """Shift of the parameters by additional columns; p value of these columns; sum of squares that
+    they explain beyond noise.
 
     columns: of each record, shape (channels, n, k). Dependent columns have no effect.
     """
@@ -244,12 +244,12 @@ def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, float, floa
         for slopes, more in zip(fit.jacobians, columns, strict=True)
     ]
     pairs = list(zip(fit.residuals, apart, strict=True))
-    # Prior values are measurements, too, with residuals of their own.
+    # Prior values are also measurements, with their own residuals.
     known = fit.priors[:, None] * onto[:, kept]
     total = known.T @ (fit.priors * fit.vector)
     total = sum((np.einsum("cn,cnk->k", *pair) for pair in pairs), start=total)
     inverse = np.linalg.pinv(own[np.ix_(kept, kept)], rcond=1e-9, hermitian=True)
-    # The explained part is no noise: included in the scores, it would hide itself.
+    # The explained part is not noise: in the scores it would hide itself.
     scores = [
         np.einsum("cn,cnk->nk", left - more @ (inverse @ total), more) for left, more in pairs
     ]

@@ -1,7 +1,7 @@
 """Response of a plant below breakaway to a sampled torque: an exponential integrator.
 
 Below breakaway the equations are linear except for the yielding of the bristles,
-n = sigma0 |v| z / s. The solution of the linear part is exact for any poles. Torque and yielding
+n = sigma0 |v| z / s. The solution of the linear part is exact for all poles. Torque and yielding
 are parabolas over each step (exponential collocation at the ends and the middle of a step,
 Hochbruck and Ostermann, Acta Numerica 19, 2010, section 2). Between samples the torque is a spline.
 
@@ -27,7 +27,7 @@ ORDER = 5
 """Order of the spline through the torque: at 0.15 of the sampling rate the error of a cubic one is
 1e-3, and that of an inertia fitted with it 4e-4."""
 PASSES = 3
-"""Iterations of the yielding in each step, where it is small below breakaway."""
+"""Iterations of the yielding in each step; few, because it is small below breakaway."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Motion:
     """A simulated motion, on a grid of the sampling step over `per_sample`.
 
     Attributes:
-        step: of the grid (s), which begins at 0.
+        step: of the grid (s); the grid begins at time 0.
         per_sample: grid steps per sample.
         angle, rate, acceleration: of the load (rad, rad/s, rad/s^2), shape (k,).
         bristle_torque: sigma0 z, shape (k, interfaces) (N m).
@@ -96,8 +96,8 @@ def simulate(
 ) -> Motion:
     """Motion for `torque` of `torque_on_grid` (N m), shape (steps, 3), from angle 0.
 
-    bristle_torque: sigma0 z of each interface at the beginning (N m); one number: their sum, in
-    proportion to stiffness; None: equal to the first torque. rate: at the beginning (rad/s).
+    bristle_torque: initial sigma0 z of each interface (N m); a number: their sum, divided in
+    proportion to stiffness; None: equal to the first torque. rate: initial rate (rad/s).
     Samples of a diverged motion are infinite or NaN.
     """
     system = _System.of(plant)
@@ -246,7 +246,7 @@ def _run(
 def _freely(
     held: Array, inputs: Array, state: Array, torque: Array, begin: Array, found: Array
 ) -> None:
-    """Fill `found` with the state by torque and the yielding at the beginning of a step alone."""
+    """Fill `found` with the state from torque and the yielding at the beginning of the step."""
     for r in range(len(state)):
         total = 0.0
         for c in range(len(state)):

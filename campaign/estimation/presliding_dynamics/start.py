@@ -13,25 +13,25 @@ from campaign.estimation.presliding_dynamics.plant import Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
 
 GROUPS = 60
-"""Groups of neighboring frequencies, even in the logarithm; the sums in a group reduce noise."""
+"""Groups of neighboring frequencies, even in the logarithm; sums over a group reduce noise."""
 FAINT = 5e-4
 """Share of the torque's power below the lowest and above the highest group."""
 PASSES = 6
-"""Iterations of the weighted regression; the weights follow from the previous plant."""
+"""Iterations of the weighted regression; each takes its weights from the previous plant."""
 
 
 def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
     """Start plant from a fit of T = (J jw + d + sigma0 / jw) V at the excited frequencies.
 
     The fit excludes yielding. Both sides are correlated with the torque, so that noise of the rate
-    causes no bias; weights after Sanathanan and Koerner (IEEE Trans. Autom. Control 8, 1963).
-    Raises ValueError where the records show no stiffness.
+    causes no bias. Weights: Sanathanan and Koerner (IEEE Trans. Autom. Control 8, 1963).
+    Raises ValueError if the records show no stiffness.
     """
     parts = [group for record in records for group in _groups(record)]
     rows = np.array([row for row, _, _ in parts])
     power = np.array([each for _, each, _ in parts])
     highest = max(omega for _, _, omega in parts)
-    # Dynamic stiffness over the rate in each group, first as measured.
+    # Dynamic stiffness over the rate in each group; the first value is the measured one.
     plant = power / np.maximum(np.abs(rows[:, 1]), np.finfo(float).tiny)
     fit = np.zeros(3)
     for _ in range(PASSES):
@@ -49,7 +49,7 @@ def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
         raise ValueError("the motion shows no stiffness: it does not come back to where it was")
     part = assumed.appendage
     if not inertia > (part.inertia if part else 0.0):
-        # No effect at high frequencies: the largest inertia without an effect.
+        # The inertia has no effect at high frequencies: use the largest one without an effect.
         inertia = max(stiffness / (4.0 * highest) ** 2, 2.0 * part.inertia if part else 0.0)
     least = 0.02 * 2.0 * np.sqrt(stiffness * inertia)
     compliance = 0.3 / max(record.amplitude for record in records)
@@ -58,7 +58,7 @@ def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
 
 
 def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
-    """For each group: sums of (jw V, V, V / jw) T*, the sum of T T*, middle frequency (rad/s)."""
+    """For each group: sums of (jw V, V, V / jw) T*, sum of T T*, center frequency (rad/s)."""
     window = np.hanning(len(record.torque))
     channels = {name: values for name, values, _ in measured(record)}
     frequency = np.fft.rfftfreq(len(window), record.step)
@@ -75,6 +75,6 @@ def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
     edges = np.unique(np.geomspace(first, last + 1, GROUPS + 1).astype(int))
     cross = rate * torque.conj()
     for begin, end in itertools.pairwise(edges):
-        here, w = cross[begin:end], omega[begin:end]
-        row = np.array([np.sum(1j * w * here), np.sum(here), np.sum(here / (1j * w))])
+        products, w = cross[begin:end], omega[begin:end]
+        row = np.array([np.sum(1j * w * products), np.sum(products), np.sum(products / (1j * w))])
         yield row, float(np.sum(power[begin:end])), float(np.sqrt(w[0] * w[-1]))

@@ -1,7 +1,7 @@
 """Uncertainty of the parameters of a joint fit.
 
 There are two covariances: one from the autocorrelated scores of all samples, and one from the
-differences between records, which is larger where friction changed between them. The second one
+differences between records. The second one is larger if friction changed between records. It
 applies where it is significantly larger.
 """
 
@@ -19,13 +19,13 @@ from campaign.estimation.presliding_dynamics.fit import search
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
 
 CHANCE = 0.01
-"""Probability of a false detection of differences between records."""
+"""Probability of falsely detecting differences between records."""
 CURVED = 0.03
 """Relative standard error above which a limit is calculated along the profile."""
 ACCURACY, DOUBLINGS = 0.01, 4
-"""Relative accuracy of such a limit; most doublings of the distance to it. Each step is a fit."""
+"""Relative accuracy of such a limit; largest number of doublings. Each step needs a fit."""
 TELLABLE = 1e10
-"""Condition number of the scaled information above which the parameters are not separable."""
+"""Condition number of the scaled information above which parameters cannot be separated."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Spread:
 
     Attributes:
         covariance: shape (k, k).
-        freedom: degrees of freedom of each deviation, shape (k,); infinite for scores.
+        freedom: degrees of freedom of each deviation, shape (k,); infinite if from scores.
     """
 
     covariance: Array
@@ -54,7 +54,7 @@ class Spread:
 def spread_of(fit: JointFit) -> Spread:
     """Covariance of the shared parameters of a fit.
 
-    Raises ValueError where the records do not separate the parameters.
+    Raises ValueError if the records do not separate the parameters.
     """
     shared = len(fit.parameters.names)
     information = fit.information
@@ -76,7 +76,7 @@ def spread_of(fit: JointFit) -> Spread:
         _folded(each, r.samples_per_period()) for each, r in zip(scores, fit.records, strict=True)
     ]
     repeated = np.sqrt(np.diag(by_scores(fit, inverse, folded, bandwidths(folded)[1])))
-    # Negatively correlated residuals would result in too small deviations.
+    # Negatively correlated residuals would cause too small deviations.
     chosen = np.maximum.reduce([safe_deviations(widths), repeated, ordinary])
     covariance = scaled_to(covariances[1], chosen)
     if len(fit.records) > 1:
@@ -91,7 +91,7 @@ def scores_of(fit: JointFit) -> list[Array]:
 
 
 def by_scores(fit: JointFit, inverse: Array, scores: Sequence[Array], lags: float) -> Array:
-    """Covariance of the shared parameters by scores with this bandwidth, shape (k, k).
+    """Covariance of the shared parameters by scores, with the bandwidth `lags`, shape (k, k).
 
     `inverse`: of the information. Priors have exactly their stated uncertainty.
     """
@@ -101,7 +101,7 @@ def by_scores(fit: JointFit, inverse: Array, scores: Sequence[Array], lags: floa
 
 
 def _folded(scores: Array, period: int | None) -> Array:
-    """Scores (n, k) summed over all periods, (period, k): their sum is the same."""
+    """Scores (n, k) summed over all periods, shape (period, k); the total is unchanged."""
     if period is None:
         return scores
     count = -(-len(scores) // period) * period
@@ -112,7 +112,7 @@ def _folded(scores: Array, period: int | None) -> Array:
 def _with_records(fit: JointFit, information: Array, covariance: Array) -> Spread:
     """Spread with the deviations between records where they exceed those of `covariance`.
 
-    The score of each record, reduced by its own parameters, shows its deviation from the shared
+    The score of a record, reduced by its own parameters, shows its deviation from the shared
     parameters (Liang and Zeger, Biometrika 73, 1986).
     """
     from scipy.special import chdtri
@@ -140,10 +140,10 @@ def profile_end(fit: JointFit, spread: Spread, index: int, quantile: float, way:
     """Limit of a shared parameter at `quantile` deviations of its profile; `way`: -1 or 1.
 
     The sum of squares is in units of the parameter's own variance, which includes the effect of
-    autocorrelated residuals. Raises ValueError where the profile has no limit.
+    autocorrelated residuals. Raises ValueError if the profile has no limit.
     """
     sigma = float(spread.deviation[index])
-    # Rise of the profiled sum of squares over the square of a small distance.
+    # Ratio of the rise of the profiled sum of squares to the square of a small distance.
     curvature = 1.0 / float(np.linalg.inv(fit.information)[index, index])
 
     def squared_rise(distance: float) -> float:

@@ -3,7 +3,7 @@
 A trend is a line over time, temperature, or another quantity in which runs differ. A jump is a
 change from one level to another. Both tests include the scatter between runs and the correlation
 of neighboring runs (`scatter`). The place of a jump is searched: its p value is the smallest of
-all places times their number (Bonferroni), which is valid for any dependence between places.
+all places times their number (Bonferroni). This is valid for any dependence between places.
 Source of the splitting: Vostrikova, Soviet Mathematics Doklady 24 (1981).
 """
 
@@ -19,17 +19,17 @@ from campaign.arrays import Array
 from campaign.estimation.trends.scatter import Fits, Mixture, fits
 
 LEAST_FOR_A_JUMP = 5
-"""Fewest points for a jump: two levels leave three of them to estimate the scatter of runs."""
+"""Fewest points for a jump: after two levels, three remain to estimate the scatter of runs."""
 ON_EACH_SIDE = 2
 """Fewest points on a side of a jump: a single point can also be an outlier."""
 CLEARLY = math.log(3.0)
 """Logarithm of the ratio of integrated likelihoods above which one shape fits clearly better."""
 HELD = 0.95
-"""Probability of the models that are kept."""
+"""Least total probability of the places in `Jump.between`."""
 POWER = 0.8
 """Probability with which a change of the detectable size is declared."""
 PICKED = 1e-3
-"""Least weight of a place that counts in the size of a jump."""
+"""Least weight of a place that contributes to the size of a jump."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class Jump:
     Attributes:
         place: index of the first point after the jump, at its most likely place.
         between: first and last of the places that have 95 % of the weight.
-        size: after less before, averaged over the likely places. Because the jump is searched,
-            the size of a barely significant jump tends to be too large.
+        size: level after less level before, averaged over the likely places. Because the place
+            is searched, the size of a barely significant jump tends to be too large.
         p: p value of no jump at any place.
         places: number of places tried.
         clearest: size at the place with the smallest uncertainty, for the detectable size.
@@ -97,12 +97,11 @@ def change(x: Array | None, values: Array, own: Array, *, jumps: bool = True) ->
     Args:
         x: abscissa of the trend, shape (n,), in any unit; None for jumps only.
         values: shape (n,), in the order of measurement.
-        own: covariance of the values' own errors, shape (n, n); zeros where they are unknown, and
-            only the scatter between runs remains. Errors common to all values are not included.
+        own: covariance of the values' own errors, shape (n, n), without errors common to all
+            values. Zeros: unknown; then only the scatter between runs remains.
         jumps: whether to test for jumps, which need a meaningful order.
 
-    Raises ValueError for fewer than three points, for values that do not differ, and where x does
-    not vary.
+    Raises ValueError for fewer than three points, for equal values, and for a constant x.
     """
     n = len(values)
     steps = steps_of(n) if jumps and n >= LEAST_FOR_A_JUMP else np.empty((n, 0))
@@ -126,10 +125,10 @@ def steps_of(n: int) -> Array:
 def jumps_of(values: Array, own: Array, level: float) -> tuple[Jump, ...]:
     """All jumps, in order: each part is split again until no significant jump remains.
 
-    Args: as for `change`; `level` is the p value at which a jump is declared. The two parts share
-    it, so that the probability of a further false jump is at most `level` at each depth. Two jumps
-    that cancel, up and soon down again, may both stay undetected. Size and place are estimated
-    between the neighboring jumps, because a search over all points includes these jumps.
+    values, own: as for `change`. level: p value at which a jump is declared. Two parts share it, so
+    that the probability of a further false jump is at most `level` at each depth. Two jumps that
+    cancel, up and soon down, may both remain undetected. Size and place are estimated between the
+    neighboring jumps, because a search over all points includes these jumps.
     """
     jumps = sorted(_split(values, own, level, 0), key=lambda jump: jump.place)
     ends = [0, *(jump.place for jump in jumps), len(values)]
@@ -140,7 +139,7 @@ def jumps_of(values: Array, own: Array, level: float) -> tuple[Jump, ...]:
 
 
 def _within(values: Array, own: Array, jump: Jump, first: int, stop: int) -> Jump:
-    """The same jump, estimated from its own segment where that is long enough."""
+    """The jump, estimated again from its own segment if that is long enough."""
     if stop - first < LEAST_FOR_A_JUMP:
         return jump
     again = change(None, values[first:stop], own[first:stop, first:stop]).jump
@@ -202,8 +201,8 @@ def _shape(evidence: Array) -> str:
 def detectable(known: Mixture, level: float) -> float:
     """Smallest size that is declared at `level` with a probability of `POWER`.
 
-    known: estimate of the number, of which only the width matters. The estimated scatter is
-        assumed to be the same with such a change.
+    known: estimate of the change; only its width matters. The scatter is assumed to be the same
+        with such a change.
     """
     from scipy.special import ndtri
 

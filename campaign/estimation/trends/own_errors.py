@@ -1,9 +1,9 @@
 """Errors of single points with few repeats.
 
 A deviation from three repeats has itself an error of a third. Points of one kind have similar
-errors. Therefore each variance is shrunk towards the common one, by the degree to which the
-variances agree (Smyth, Statistical Applications in Genetics and Molecular Biology 3, 2004,
-sections 3 and 6.2).
+errors. Therefore each variance is shrunk towards the common one. The shrinkage increases with their
+agreement (Smyth, Statistical Applications in Genetics and Molecular Biology 3, 2004, sections 3 and
+6.2).
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from campaign.arrays import Array
 from campaign.estimation.intervals import student
 
 MANY = 1e4
-"""Degrees of freedom that stand for infinitely many."""
+"""Degrees of freedom that represent infinity."""
 
 
 def moderated(errors: Array, freedom: Array) -> Array:
-    """Moderated standard deviations of points, from standard errors; shape (n,) each.
+    """Moderated standard deviations of points, from standard errors.
 
     Args:
-        errors: standard error of each point, positive.
-        freedom: degrees of freedom of each; infinite for an exact error.
+        errors: standard error of each point, positive, shape (n,).
+        freedom: degrees of freedom of each, shape (n,); infinite for an exact error.
 
-    Returns: shape (n,), widened as Student's t for the remaining degrees of freedom.
+    Returns: shape (n,), widened as Student's t for the resulting degrees of freedom.
     """
     from scipy.special import digamma, polygamma
 
@@ -43,7 +43,7 @@ def moderated(errors: Array, freedom: Array) -> Array:
 
 
 def _inverse_trigamma(value: float) -> float:
-    """Twice the x with the trigamma `value`; infinite where that is too small."""
+    """Twice the x whose trigamma is `value`; infinite if `value` is too small."""
     from scipy.optimize import brentq
     from scipy.special import polygamma
 

@@ -12,11 +12,10 @@ Association 72, 1977) times three priors:
   negligible, so that independent points without own errors have exactly Student's t; almost flat
   below s, as Gelman (Bayesian Analysis 1, 2006) recommends for a variance that may be 0;
 - for the own errors, a probability of 1/2 that they are as stated, and of 1/2 that they are between
-  `LEAST_OWN` of that and that (flat in the logarithm): an error common to all intervals, such as a
-  misfit of the model, cancels in differences, and then points scatter much less than their
-  intervals;
-- flat for rho from 0 to `MOST_RHO`: few points do not determine rho, and intervals are valid on
-  average over it. A negative rho, which reduces the error of slopes, is excluded.
+  `LEAST_OWN` times that and that (flat in the logarithm). An error common to all intervals, such as
+  a misfit of the model, cancels in differences. Then points scatter much less than their intervals;
+- flat for rho from 0 to `MOST_RHO`. Few points do not determine rho; intervals are valid on average
+  over it. A negative rho, which reduces the error of slopes, is excluded.
 """
 
 from __future__ import annotations
@@ -36,13 +35,13 @@ MOST_RHO = 0.9
 LEAST_OWN = 0.02
 """Least share of the stated own errors that may be independent."""
 OWNS = 6
-"""Nodes in that share; the share 1 has half of the weight."""
+"""Number of nodes in this share; the share 1 has half of the weight."""
 RHOS = 12
-"""Nodes (Gauss-Legendre) in the correlation."""
+"""Number of nodes (Gauss-Legendre) in the correlation."""
 COARSE, FINE = 8, 60
-"""Nodes in tau: per decade in the search of its range, and within the range."""
+"""Number of nodes in tau: per decade in the search of its range; within the range."""
 NEGLIGIBLE = 18.0
-"""Distance of the logarithm of a weight from the largest, beyond which it is not used."""
+"""Distance of a weight's logarithm from the largest, beyond which the weight is not used."""
 FLOOR = 1e-7
 """Least own error of a point, as a share of the scatter, so that matrices stay regular."""
 WIDEST = 1e3
@@ -230,7 +229,7 @@ def _nodes() -> tuple[Array, Array]:
 def _shares(own: Array) -> tuple[Array, Array]:
     """Independent shares of the own errors, and logarithms of their weights.
 
-    Only the share 1 without own errors, and where their covariance has off-diagonal elements.
+    Only the share 1 if there are no own errors, or their covariance has off-diagonal elements.
     """
     if not own.any() or np.any(own != np.diag(np.diag(own))):
         return np.ones(1), np.zeros(1)
@@ -246,7 +245,7 @@ def _nodes_of_shares() -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class _Rotated:
-    """Data in coordinates in which both covariances are diagonal: own 1, between `size`."""
+    """Data in coordinates where both covariances are diagonal: `own` is 1, `between` is `size`."""
 
     y: Array
     one: Array
@@ -295,8 +294,8 @@ def _fit(
 ) -> tuple[Array, ...]:
     """First fields of `Fits` for one rho: shapes (k t, m) and (k t,).
 
-    There are t nodes of tau over the share of the own errors, and k nodes of that share, which is a
-    common factor of all deviations and needs no new calculation.
+    There are t nodes of tau over the share of the own errors, and k nodes of that share. The share
+    is a common factor of all deviations and needs no new calculation.
     """
     spread = 1.0 + taus[:, None] ** 2 * at.size
     w = 1.0 / spread
