@@ -1,6 +1,6 @@
 """Errors of single points with few repeats.
 
-A deviation from three repeats has itself an error of a third. Points of one kind have similar
+A deviation from three repeats has itself an error of a half. Points of one kind have similar
 errors. Therefore each variance is shrunk towards the common one. The shrinkage increases with their
 agreement (Smyth, Statistical Applications in Genetics and Molecular Biology 3, 2004, sections 3 and
 6.2).
