@@ -162,12 +162,12 @@ class Trial(Options):
 
         Hashed as canonical JSON.
         """
-        what = {"task": self.task.model_dump(mode="json"), "seed": self.seed}
+        others = {"task": self.task.model_dump(mode="json"), "seed": self.seed}
         if self.truth:
-            what["truth"] = self.truth
+            others["truth"] = self.truth
         if self.recording:
-            what["recording"] = self.recording
-        return fingerprint(self.bench, what)
+            others["recording"] = self.recording
+        return fingerprint(self.bench, others)
 
     @property
     def apart_from_seed(self) -> tuple[str, str, Task]:
@@ -264,9 +264,12 @@ def canonical_json(tree: Any) -> str:
     return json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
-def fingerprint(bench: Tree, what: Mapping[str, Any]) -> str:
-    """SHA-256 of a bench and of all else that determines samples, as one canonical JSON text."""
-    text = f'{{"bench":{tree_text(bench)},{canonical_json(what)[1:]}'  # keys are sorted
+def fingerprint(bench: Tree, others: Mapping[str, Any]) -> str:
+    """SHA-256 of a bench and of the other fields that determine samples, as one canonical JSON.
+
+    The keys of `others` follow `bench` in the alphabet.
+    """
+    text = f'{{"bench":{tree_text(bench)},{canonical_json(others)[1:]}'
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -285,7 +288,7 @@ _TEXTS: dict[int, tuple[Tree, str]] = {}
 
 
 def tree_text(tree: Tree) -> str:
-    """`canonical_json` of a tree that trials share, and nobody changes; recent texts are cached."""
+    """`canonical_json` of a tree that trials share and that must not change; texts are cached."""
     kept = _TEXTS.get(id(tree))  # the cached tree keeps its id
     if kept is None:
         if len(_TEXTS) >= _MOST_TEXTS:

@@ -30,7 +30,9 @@ from campaign.trial import Trial
 LOOK = 0.25
 """s between two updates of the display; longest delay of a stop request to the executor."""
 MOST_WAITING = 100
-"""Ended trials of simulations that wait for their copy before new trials wait for them."""
+"""Number of ended trials of a simulation from which a copy comes before the next results."""
+AT_REST = 2
+"""Copies between two trials of a bench; more than one, so that a resumed run catches up."""
 ENDING = 10.0
 """s that the other trials may take to end when the run cannot continue."""
 MOST_LOST = 3
@@ -86,9 +88,9 @@ class TrialSequence:
         """Keep all workers busy. Raises errors of the archive, and KeyboardInterrupt."""
         try:
             while True:
-                while self._live and not (self._running or self._is_over()):  # it is at rest
-                    if not self._writer.seal_next():
-                        break
+                if self._live and not (self._running or self.halted()):  # the bench is at rest
+                    for _ in range(AT_REST):
+                        self._writer.seal_next()
                 while len(self._running) < executor.most_pending and (batch := self._next()):
                     self._ledger.begin(*batch)
                     self._under_way |= {trial.number: trial for trial in batch}
@@ -107,7 +109,9 @@ class TrialSequence:
             raise
 
     def _hear(self, executor: BatchExecutor) -> None:
-        """Process all ended trials and batches; wait for one if none is to be copied meanwhile."""
+        """Process all ended trials and batches. If there are none, copy an ended trial of a
+        simulation into the sealed file, or wait.
+        """
         copied = not (self._live or self.halted()) and self._writer.seal_next(
             1 if self._news.empty() else MOST_WAITING
         )

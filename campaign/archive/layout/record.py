@@ -139,8 +139,8 @@ class TrialRecord(ArchivedModel):
         old archives do not have.
         """
         there = (name for name in _DETERMINING_WHERE_THERE if self.trial.get(name))
-        what = {name: self.trial[name] for name in (*_DETERMINING, *there)}
-        return fingerprint(trees[str(self.trial["bench"])], what)
+        others = {name: self.trial[name] for name in (*_DETERMINING, *there)}
+        return fingerprint(trees[str(self.trial["bench"])], others)
 
     @cached_property
     def text(self) -> str:
@@ -194,7 +194,7 @@ def parse_trees(text: str) -> dict[str, Tree]:
 
 @lru_cache(maxsize=16)
 def _tree(line: str) -> tuple[str, Tree]:
-    """Digest and tree of a line; successive trials share it, so it must not be changed."""
+    """Digest and tree of a line. Successive trials share the tree, so it must not be changed."""
     match = _TREE.fullmatch(line)
     # The text of a tree is hashed unparsed: written trees are canonical.
     if match is None or text_digest(match[2]) != match[1]:

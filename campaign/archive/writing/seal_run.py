@@ -88,9 +88,9 @@ class Sealer:
         self._first.setdefault(finished.trial, finished)
 
     def advance(self, fewest: int = 1) -> bool:
-        """Copy the next trial if it has finished and so many wait; whether there was one.
+        """Copy the next trial if it has finished and at least `fewest` finished trials wait.
 
-        Errors end copying.
+        Errors end copying. Returns whether a copy was tried.
         """
         if self._gave_up or self._next not in self._first or len(self._first) < fewest:
             return False

@@ -241,9 +241,10 @@ class RunWriter:
                     self._measured[entry.record] = place
 
     def seal_next(self, fewest: int = 1) -> bool:
-        """Copy the next finished trial into the sealed file, if so many wait; whether it did.
+        """Copy the next finished trial into the sealed file if at least `fewest` wait.
 
-        It takes 5 ms, and 6 ms for each MB: call it from one thread, while no bench moves.
+        A copy takes 5 ms, and 6 ms per MB. Call it from one thread, while no bench moves.
+        Returns whether a copy was tried.
         """
         with self.timing.span(Work.SEALING):
             return self._sealer.advance(fewest)
