@@ -2,6 +2,10 @@
 
 import json
 import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -21,6 +25,7 @@ from tests.archive.forging import (
     sha256,
     text_of,
 )
+from tests.archive.test_kept import KEPT
 
 
 def read_all(path):
@@ -259,6 +264,29 @@ def test_a_record_that_is_none_costs_only_its_trial(sealed, text):
         put_record(file, "trial_00001", text)
         reseal(file)
     only_the_first_is_refused(sealed)
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_a_heap_that_hdf5_would_never_leave_is_damage(sealed, tmp_path, kept):
+    """In archives of today, and in older ones, whose checksums are in heaps too."""
+    path = shutil.copy(KEPT / "format-3.nxs", tmp_path) if kept else sealed
+    damage_heaps(path)
+    reading = [sys.executable, "-m", "campaign", "verify", str(path)]
+    done = subprocess.run(reading, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == ExitCode.ARCHIVE
+    assert "cannot be read: its attributes are damaged" in done.stdout + done.stderr
+
+
+def damage_heaps(path):
+    """Set the size of the free space of every heap to zero: HDF5 steps through it for ever."""
+    content = bytearray(Path(path).read_bytes())
+    for heap in re.finditer(rb"GCOL\x01\0\0\0", content):
+        place = heap.start() + 16
+        while int.from_bytes(content[place : place + 2], "little"):  # an object, not free space
+            size = int.from_bytes(content[place + 8 : place + 16], "little")
+            place += 16 + (size + 7) // 8 * 8
+        content[place + 8 : place + 16] = bytes(8)
+    Path(path).write_bytes(content)
 
 
 def test_verifying_names_each_forged_record_of_trials_without_samples(sealed):

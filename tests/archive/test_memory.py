@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tracemalloc
 from collections.abc import Iterator
@@ -62,7 +63,9 @@ def test_texts_written_in_pieces_are_what_the_folder_had(tmp_path: Path, kit, mo
     assert verify_run(path).problems == ()
     with h5py.File(path) as file:
         for note, text in texts.items():
-            assert file[f"run/{note}/data"][()].decode().startswith(text)
+            data = file[f"run/{note}/data"]
+            assert data[()].decode().startswith(text)
+            assert data.attrs["sha256"].decode() == hashlib.sha256(data[()]).hexdigest()
         assert len(file["run/index/data"][()].splitlines()) == 5 * FEW
 
 

@@ -124,6 +124,14 @@ def test_a_trial_is_restored_from_its_record_and_the_trees(record, kit):
         record.restored({})
 
 
+def test_its_fingerprint_covers_a_truth_and_a_recording(kit, record):
+    trial = kit.trial(7).model_copy(update={"truth": "1" * 64, "recording": {"log.csv": "2" * 64}})
+    described, trees = shared_trees(trial)
+    described_record = record.model_copy(update={"trial": described})
+    assert described_record.fingerprint_of(trees) == trial.fingerprint
+    assert trial.fingerprint != kit.trial(7).fingerprint
+
+
 def test_a_tree_that_is_not_that_of_its_digest_is_refused(kit):
     _, trees = shared_trees(kit.trial(1))
     text = trees_text(trees)
