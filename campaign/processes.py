@@ -130,18 +130,18 @@ def _begin(handed: bytes) -> None:
 def initialize_worker() -> None:
     """Set up a worker process: it ignores Ctrl-C and exits with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    raise_gc_threshold()
-    keep_freed_memory()
+    tune_memory()
     sys.stdout = sys.stderr  # prints of a plug-in
     threading.Thread(target=_exit_with_parent, daemon=True).start()
 
 
-def keep_freed_memory() -> None:
-    """Keep freed memory of arrays in the process: the next trial needs as much.
+def tune_memory() -> None:
+    """Collect garbage seldom, and keep freed memory of arrays: the next trial needs as much.
 
     Otherwise the system zeroes each page again: a tenth of the processor time of a trial without
-    samples. Only for the GNU C library.
+    samples. That part is only for the GNU C library.
     """
+    raise_gc_threshold()
     with contextlib.suppress(AttributeError, TypeError):
         mallopt = ctypes.CDLL(None).mallopt
         mallopt(_MMAP_THRESHOLD, 1 << 25)  # largest value allowed on all platforms

@@ -10,7 +10,7 @@ import pytest
 
 TAKEN_TWICE = """
 import resource
-from campaign.processes import keep_freed_memory
+from campaign.processes import tune_memory
 {keep}
 def faults():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
@@ -31,4 +31,4 @@ def faults_of_the_second_time(keep: str) -> int:
 def test_memory_of_a_trial_serves_the_next_one() -> None:
     pages = 60_000_000 // 4096
     assert faults_of_the_second_time("") > pages / 2
-    assert faults_of_the_second_time("keep_freed_memory()") < pages / 100
+    assert faults_of_the_second_time("tune_memory()") < pages / 100

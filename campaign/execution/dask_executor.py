@@ -22,6 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from campaign import processes
 from campaign.archive import RunWriter
 from campaign.archive.layout.files import PART, keep_umask, publish_all
 from campaign.archive.writing.trial_file import lost_trial
@@ -313,6 +314,7 @@ def execute_remotely(
     """Execute a batch in a worker of a cluster."""
     worker = _workers.get(run)
     if worker is None:
+        processes.tune_memory()
         given: WorkerSetup = pickle.loads(setup)  # noqa: S301 - from a client of the scheduler
         worker = BatchWorker(given, lambda: run in _stopped)
         _workers.clear()

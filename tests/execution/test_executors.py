@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -17,13 +18,14 @@ from pathlib import Path
 
 import pytest
 
+from campaign import processes
 from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL, Decision
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.errors import ArchiveError
-from campaign.execution import executors
+from campaign.execution import dask_executor, executors
 from campaign.execution.attempt import Conditions
-from campaign.execution.executors import ProcessExecutor, process_executor
+from campaign.execution.executors import ProcessExecutor, WorkerSetup, process_executor
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
@@ -31,6 +33,7 @@ from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.trial_metrics import TrialMeasurement
 from campaign.experiments import experiments
+from campaign.policy import KEEP_ALL
 from campaign.protocol import Plan
 from campaign.recording import Outcome
 from campaign.stopwatch import UNTIMED, Stopwatch, Timing, Work
@@ -279,3 +282,16 @@ def test_processes_end_with_a_run_that_is_killed_and_it_goes_on(
     writer = RunWriter.resume(folder, at="2026-11-21T10:00:00Z", host={}, versions={}, command=())
     outcome = run(plan, tmp_path, writer=writer, in_processes=False)
     assert_same(outcome.archive, by_threads)
+
+
+def test_a_worker_of_a_cluster_keeps_memory_as_one_at_home(plan: Plan, monkeypatch) -> None:
+    """Dask's own settings return it at once: a trial without samples took half as long again."""
+    tuned: list[int] = []
+    monkeypatch.setattr(processes, "tune_memory", lambda: tuned.append(1))
+    monkeypatch.setattr(dask_executor, "_workers", {})
+    backend = SimBackend(SimOptions())
+    setup = WorkerSetup(backend, Supervision(), KEEP_ALL, is_measured=False, is_timed=False)
+    for trial in plan.trials[:2]:
+        arguments = pickle.dumps(setup), [trial], {trial.number: 1}
+        assert dask_executor.execute_remotely("run", *arguments).error is None
+    assert tuned == [1]
