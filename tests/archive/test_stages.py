@@ -5,7 +5,7 @@ import json
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, list_runs, open_run
-from campaign.archive.layout.followup_trials import stages_in, trials_followed, trials_in
+from campaign.archive.layout.followup_trials import trials_followed, trials_in
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
 from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.verification.verify_run import verify_run
@@ -59,7 +59,7 @@ def test_a_sealed_run_is_gone_on_with_and_has_them_again(tmp_path, kit):
     writer, further = begun(tmp_path, kit)
     path = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
     writer = RunWriter.resume(path, **kit.RESUMED)
-    assert list(trials_in(stages_in(read_journal(writer.folder / JOURNAL).entries))) == further
+    assert list(trials_in(read_journal(writer.folder / JOURNAL).stages)) == further
     assert writer.archived(3).trial == further[0]
     assert writer.archived(3).ending.outcome is Outcome.COMPLETED
     with pytest.raises(LookupError):

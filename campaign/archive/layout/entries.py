@@ -24,11 +24,6 @@ def entry_name(trial_number: int) -> str:
     return f"trial_{trial_number:05d}"
 
 
-def earlier_entry_name(trial_number: int, attempt: int) -> str:
-    """Name of the group of a replaced attempt, in a sealed run."""
-    return f"{entry_name(trial_number)}_attempt_{attempt}"
-
-
 def file_name(trial_number: int, attempt: int) -> str:
     """Name of a trial's file: `trial-00017.trial`; of a second attempt `trial-00017-2.trial`."""
     return f"trial-{trial_number:05d}{f'-{attempt}' if attempt > 1 else ''}{TRIAL}"
@@ -40,7 +35,6 @@ def entry_names(attempts: Iterable[TrialFinished]) -> dict[str, TrialFinished]:
     last = {finished.trial: finished.attempt for finished in known}
     return {
         entry_name(each.trial)
-        if each.attempt == last[each.trial]
-        else earlier_entry_name(each.trial, each.attempt): each
+        + ("" if each.attempt == last[each.trial] else f"_attempt_{each.attempt}"): each
         for each in known
     }

@@ -13,7 +13,7 @@ from pydantic import JsonValue
 
 from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.header import PlannedTrial
-from campaign.archive.layout.journal import Entry, FollowedTrial, TrialRefused, TrialsFollowed
+from campaign.archive.layout.journal import FollowedTrial, TrialRefused, TrialsFollowed
 from campaign.archive.layout.record import restored_trial, shared_trees
 from campaign.trial import Tree, Trial, canonical_json
 
@@ -47,16 +47,6 @@ def trials_followed(
         trees=trees,
         refused=tuple(TrialRefused(label=label, why=why) for label, why in refused),
     )
-
-
-def stages_in(entries: Iterable[Entry]) -> tuple[TrialsFollowed, ...]:
-    """The stages in a journal, in order."""
-    return tuple(entry for entry in entries if isinstance(entry, TrialsFollowed))
-
-
-def planned_in(stages: Iterable[TrialsFollowed]) -> tuple[PlannedTrial, ...]:
-    """The trials of stages as lines of a plan."""
-    return tuple(each for stage in stages for each in stage.trials)
 
 
 def trials_in(stages: Iterable[TrialsFollowed]) -> Iterator[Trial]:

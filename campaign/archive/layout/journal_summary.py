@@ -14,6 +14,7 @@ from typing import TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from campaign.archive.layout.files import read_errors
+from campaign.archive.layout.header import PlannedTrial
 from campaign.archive.layout.journal import (
     ENTRY,
     Entry,
@@ -22,6 +23,7 @@ from campaign.archive.layout.journal import (
     RunStarted,
     TrialFinished,
     TrialMeasured,
+    TrialsFollowed,
 )
 from campaign.archive.layout.json_lines import line_places, parse_at_once
 from campaign.errors import ArchiveError
@@ -87,6 +89,16 @@ class Lines:
             attempts.pop((each.trial, each.attempt), None)
             attempts[each.trial, each.attempt] = each
         return list(attempts.values())
+
+    @cached_property
+    def stages(self) -> tuple[TrialsFollowed, ...]:
+        """The stages, in order."""
+        return tuple(self.all(TrialsFollowed))
+
+    @property
+    def followed(self) -> tuple[PlannedTrial, ...]:
+        """The trials of the stages, as lines of a plan."""
+        return tuple(trial for stage in self.stages for trial in stage.trials)
 
     @property
     def ended(self) -> RunEnded | None:

@@ -6,10 +6,10 @@ The line of the journal refers to the record of the trial by its digest.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from campaign.archive.layout.journal import Entry, TrialFinished, TrialMeasured
+from campaign.archive.layout.journal import TrialFinished, TrialMeasured
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.estimate import Estimate
 
@@ -48,11 +48,6 @@ def trial_measured(at: str, finished: TrialFinished, found: ArchivedMetrics) -> 
             ],
         }
     )
-
-
-def measured_in(entries: Iterable[Entry]) -> dict[str, TrialMeasured]:
-    """The metrics in lines of a journal, by the digest of the trial's record."""
-    return {entry.record: entry for entry in entries if isinstance(entry, TrialMeasured)}
 
 
 def with_metrics(archived: ArchivedTrial, measured: TrialMeasured | None) -> ArchivedTrial:

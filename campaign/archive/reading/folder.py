@@ -7,13 +7,12 @@ from pathlib import Path
 
 from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import read_errors
-from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
 from campaign.archive.layout.header import PARTIAL, PlannedTrial, RunStatus
-from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished
+from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished, TrialMeasured
 from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.run_folder import PLAN, parse_plan, read_header, read_text
-from campaign.archive.reading.archived_metrics import measured_in, with_metrics
+from campaign.archive.reading.archived_metrics import with_metrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.run_reader import RunReader
@@ -28,7 +27,7 @@ def open_folder(folder: Path) -> RunReader:
     header = read_header(folder)
     damaged = DamageList(folder)
     story = _story(folder, damaged)
-    measured = measured_in(story.entries)
+    measured = {each.record: each for each in story.all(TrialMeasured)}
     trials: list[ArchivedTrial] = []
     earlier: dict[int, list[ArchivedTrial]] = {}
     for entry, finished in entry_names(story.attempts).items():
@@ -43,7 +42,6 @@ def open_folder(folder: Path) -> RunReader:
     planned: tuple[PlannedTrial, ...] = damaged.read(
         lambda: parse_plan(folder / PLAN, read_text(folder / PLAN)), ()
     )
-    stages = stages_in(story.entries)
     return RunReader(
         path=folder,
         header=header,
@@ -51,13 +49,12 @@ def open_folder(folder: Path) -> RunReader:
         reason=ended.reason if ended else "the run is in progress or was killed",
         safe_state=ended.safe_state if ended else SafeState.NOT_CONFIRMED,
         ended=ended.at if ended else "",
-        plan=planned + planned_in(stages),
+        plan=planned + story.followed,
         trials=tuple(trials),
         story=story,
-        full_plan=FullPlan(folder, partial(_plan_texts, folder), stages),
+        full_plan=FullPlan(folder, partial(_plan_texts, folder), story.stages),
         damaged=tuple(damaged.found),
         earlier_attempts={number: tuple(tries) for number, tries in earlier.items()},
-        stages=stages,
     )
 
 

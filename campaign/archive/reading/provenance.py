@@ -3,42 +3,41 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Container
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import ValidationError
 
 from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.run_folder import first_line
-from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.seal import SealedTexts
 from campaign.errors import ArchiveError
 
 PROVENANCE = "/run/provenance"
 
 
-def read_provenance(
-    names: Container[str], text: Callable[[str], str], sources: dict[str, str], damaged: DamageList
-) -> RunHeader:
-    """Read the header of a run; an unreadable field is noted and left out.
-
-    Args:
-        names: fields in the file.
-        text: reads a field. Raises ArchiveError.
-        sources: see `RunHeader.sources`.
-        damaged: list to which unreadable fields are added.
+def read_provenance(texts: SealedTexts, damaged: DamageList) -> RunHeader:
+    """Read the header of a run; an unreadable field is noted in `damaged` and left out.
 
     Raises ArchiveError if a required field (name, start) is unreadable.
     """
-    tree: dict[str, Any] = {"sources": sources}
+    names = texts.names("provenance")
+    tree: dict[str, Any] = {"sources": dict(_sources(texts, damaged))}
     for name, info in RunHeader.model_fields.items():
         if info.is_required():
-            tree[name] = text(name)
+            tree[name] = texts.text(f"provenance/{name}")
         elif name != "sources" and name in names:
-            with damaged.noting(), safe_hdf5.guarded(damaged.path, f"{PROVENANCE}/{name}"):
-                content = text(name)
+            with damaged.noting():
+                content = texts.text(f"provenance/{name}")
                 tree[name] = content if info.annotation is str else _json(damaged, name, content)
     return _validated(tree, damaged)
+
+
+def _sources(texts: SealedTexts, damaged: DamageList) -> Iterator[tuple[str, str]]:
+    for name in texts.notes("source_"):
+        with damaged.noting():
+            yield texts.text(f"{name}/file_name"), texts.text(f"{name}/data")
 
 
 def _validated(tree: dict[str, Any], damaged: DamageList) -> RunHeader:

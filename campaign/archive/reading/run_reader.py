@@ -21,25 +21,6 @@ from campaign.trial import Tree, Trial
 
 
 @dataclass(frozen=True)
-class Glance:
-    """Facts of a run for `campaign list`; counts of trials include follow-up trials.
-
-    Attributes:
-        failed: excludes `interrupted` trials, which an operator stopped.
-        untold: see `RunSummary`.
-    """
-
-    header: RunHeader
-    planned: int
-    status: RunStatus
-    ended: str
-    finished: int
-    failed: int
-    interrupted: int
-    untold: int = 0
-
-
-@dataclass(frozen=True)
 class RunReader:
     """An archived run. Samples are read only through the `recording()` of a trial.
 
@@ -59,8 +40,6 @@ class RunReader:
             checked only when read, and by `problems`.
         earlier_attempts: by trial number, the attempts that a later one replaced; no analysis uses
             them.
-        stages: follow-up trials that depend on earlier results, from the journal; empty in archives
-            older than stages. The header counts the trials of the plan without them.
         root: digest of the seal, which covers the whole run: see `checksums`. Empty while the run
             is in progress.
     """
@@ -78,16 +57,20 @@ class RunReader:
     damaged: tuple[Damage, ...] = ()
     earlier_attempts: Mapping[int, tuple[ArchivedTrial, ...]] = field(default_factory=dict)
     root: str = ""
-    stages: tuple[TrialsFollowed, ...] = ()
 
     @property
     def name(self) -> str:
         return self.header.name
 
     @property
+    def stages(self) -> tuple[TrialsFollowed, ...]:
+        """Follow-up trials that depend on earlier results; the header does not count them."""
+        return self.story.stages
+
+    @property
     def first_stage(self) -> tuple[PlannedTrial, ...]:
         """The trials that were planned before the run began."""
-        return self.plan[: len(self.plan) - sum(len(stage.trials) for stage in self.stages)]
+        return self.plan[: len(self.plan) - len(self.story.followed)]
 
     @property
     def tests(self) -> tuple[Tree, ...]:

@@ -94,9 +94,13 @@ class SealedTexts:
             return safe_hdf5.raw_text_at(parent, name, self._digest(place))
 
     def unchecked(self, place: str) -> bytes:
-        """A text of `/run` in UTF-8 without a check; it may be damaged. Raises ArchiveError."""
-        with safe_hdf5.guarded(self._path, f"/run/{place}"):
+        """A text of `/run` in UTF-8 without a check; empty if it cannot be read."""
+        with (
+            contextlib.suppress(ArchiveError),
+            safe_hdf5.guarded(self._path, f"/run/{place}"),
+        ):
             return safe_hdf5.unchecked_raw_text_at(*self._parent(place))
+        return b""
 
     def line_digests(self, place: str) -> list[str]:
         """SHA-256 of each line of a text of `/run`; empty if it cannot be read."""

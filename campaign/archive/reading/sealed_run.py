@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
@@ -12,7 +12,6 @@ from pathlib import Path
 import h5py
 
 from campaign.archive.layout.entries import entry_name, entry_names, file_name
-from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import SEALED, PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import RunStarted, TrialFinished
@@ -31,8 +30,9 @@ from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.lazy_trials import LazyTrials, Outline
 from campaign.archive.reading.packed_trial_reader import packed_record, parse_record
 from campaign.archive.reading.provenance import read_provenance
-from campaign.archive.reading.run_reader import Glance, RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.seal import SEAL, SealedTexts
+from campaign.archive.reading.summary import RunSummary
 from campaign.errors import ArchiveError
 from campaign.gc_threshold import paused_collection
 from campaign.recording import Outcome, SafeState
@@ -54,7 +54,7 @@ def read_sealed(path: Path) -> RunReader:
         safe_hdf5.guarded(path, "/run"),
     ):
         texts = SealedTexts(path, file, damaged)
-        header = _header(texts, damaged)
+        header = read_provenance(texts, damaged)
         if texts.seal is not None and texts.seal.run != header.name:
             damaged.add(f"/run/{SEAL}", f"is of the run {texts.seal.run!r}, not of {header.name!r}")
         story = read_lines(damaged.read(lambda: texts.raw("journal/data"), b""), lean=True)
@@ -62,8 +62,7 @@ def read_sealed(path: Path) -> RunReader:
         planned: tuple[PlannedTrial, ...] = damaged.read(
             lambda: parse_plan(path, texts.text("plan/data")), ()
         )
-        stages = stages_in(story.entries)
-        plan = planned + planned_in(stages)
+        plan = planned + story.followed
         trial_index = _Trials.read(path, texts, story, file, damaged)
         trials, earlier = trial_index.archived(plan, damaged)
         _note_contradictions(texts, header, story, len(planned), damaged)
@@ -77,31 +76,30 @@ def read_sealed(path: Path) -> RunReader:
             plan=plan,
             trials=trials,
             story=story,
-            full_plan=FullPlan(path, partial(_plan_texts, path), stages),
+            full_plan=FullPlan(path, partial(_plan_texts, path), story.stages),
             damaged=tuple(damaged.found),
             earlier_attempts=earlier,
             root=texts.root,
-            stages=stages,
         )
 
 
-def read_glance(path: Path) -> Glance:
-    """Read the summary of a sealed run for a listing. Raises ArchiveError."""
+def read_summary(path: Path) -> RunSummary:
+    """Read the summary of a sealed run, without its size. Raises ArchiveError."""
     check_sealed(path)
     damaged = DamageList(path)
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run"):
         texts = SealedTexts(path, file, damaged)
-        header = _header(texts, damaged)
+        header = read_provenance(texts, damaged)
         status = RunStatus(texts.text("outcome/status"))
         interrupted = 0
         if status in (RunStatus.INTERRUPTED, RunStatus.FAULT):  # else the plan was completed
             interrupted = read_lines(texts.raw("journal/data")).interrupted
-        return Glance(
-            header=header,
+        return replace(
+            RunSummary.of_header(path, header),
             planned=header.trials + _followed(texts, header),
             status=status,
             ended=texts.text("end_time"),
-            finished=texts.integer("outcome/trials_finished"),
+            trials=texts.integer("outcome/trials_finished"),
             failed=texts.integer("outcome/trials_failed") - interrupted,
             interrupted=interrupted,
         )
@@ -126,14 +124,7 @@ def _followed(texts: SealedTexts, header: RunHeader) -> int:
     """Number of follow-up trials; the journal is read only if a test has stages."""
     if not any(test.get("stages") for test in header.tests):
         return 0
-    story = read_lines(texts.raw("journal/data"))
-    return len(planned_in(stages_in(story.entries)))
-
-
-def _header(texts: SealedTexts, damaged: DamageList) -> RunHeader:
-    names = texts.names("provenance")
-    sources = dict(_sources(texts, damaged))
-    return read_provenance(names, lambda name: texts.text(f"provenance/{name}"), sources, damaged)
+    return len(read_lines(texts.raw("journal/data")).followed)
 
 
 def _plan_texts(path: Path) -> tuple[str, str]:
@@ -185,12 +176,6 @@ def note_journal(story: Lines, damaged: DamageList) -> None:
         damaged.add("/run/journal", "is not a whole journal")
 
 
-def _sources(texts: SealedTexts, damaged: DamageList) -> Iterator[tuple[str, str]]:
-    for name in texts.notes("source_"):
-        with damaged.noting():
-            yield texts.text(f"{name}/file_name"), texts.text(f"{name}/data")
-
-
 @dataclass(frozen=True)
 class _Trials:
     """Sources of the records of a sealed run.
@@ -222,7 +207,7 @@ class _Trials:
     def read(
         cls, path: Path, texts: SealedTexts, story: Lines, file: h5py.File, damaged: DamageList
     ) -> _Trials:
-        trees = _unchecked(texts, "trees/data")
+        trees = texts.unchecked("trees/data")
         _is_as_sealed(texts, "trees/data", damaged)
         names = entry_names(story.attempts)
         recorded = [each.record for each in names.values()]
@@ -241,7 +226,7 @@ class _Trials:
     def index(self) -> bytes:
         """The index, read at first use; it may be damaged."""
         with safe_hdf5.open_file(self.path) as file, safe_hdf5.guarded(self.path, "/run"):
-            return _unchecked(SealedTexts(self.path, file, DamageList(self.path)), "index/data")
+            return SealedTexts(self.path, file, DamageList(self.path)).unchecked("index/data")
 
     @cached_property
     def lines(self) -> dict[str, slice]:
@@ -370,14 +355,6 @@ def _good_trees(raw: bytes) -> Trees:
         except ValueError:
             continue
     return trees
-
-
-def _unchecked(texts: SealedTexts, place: str) -> bytes:
-    """A text that may be damaged; empty if it cannot be read."""
-    try:
-        return texts.unchecked(place)
-    except ArchiveError:
-        return b""
 
 
 def _is_as_sealed(texts: SealedTexts, place: str, damaged: DamageList) -> bool:

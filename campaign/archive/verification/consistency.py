@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from campaign.archive.layout.entries import entry_names
-from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal import RunStarted, TrialFinished, TrialMeasured
@@ -85,11 +84,10 @@ def check_measured(story: Lines, place: str, found: DamageList) -> None:
 
 def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
     """Check that follow-up trials continue the plan's numbers and each stage is decided once."""
-    stages = stages_in(story.entries)
-    numbers = [trial.number for trial in planned_in(stages)]
+    numbers = [trial.number for trial in story.followed]
     if numbers != list(range(header.trials + 1, header.trials + 1 + len(numbers))):
         found.add(place, "numbers trials of later stages otherwise than after the plan's")
-    counts = Counter(canonical_json([s.test, s.stage, s.point]) for s in stages)
+    counts = Counter(canonical_json([s.test, s.stage, s.point]) for s in story.stages)
     for text, count in counts.items():
         if count > 1:
             found.add(place, f"names the trials of a stage {count} times at {text}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache, partial
@@ -15,9 +14,8 @@ from h5py import h5d
 
 from campaign import __version__
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import entry_name
+from campaign.archive.layout.entries import entry_name, entry_names
 from campaign.archive.layout.files import sha256_of
-from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
 from campaign.archive.layout.journal import JOURNAL, RunEnded, TrialFinished
@@ -134,8 +132,7 @@ class SealedFile:
 
     def _index(self, folder: Path) -> Iterator[bytes]:
         """The records as lines, in the order of trials, read again from the trial files."""
-        for entry in sorted(self.copied, key=_by_number):
-            finished = self.copied[entry]
+        for finished in entry_names(self.copied.values()).values():
             packed = read_packed(folder / finished.file, entry_name(finished.trial))
             if text_digest(packed.record) != finished.record:
                 raise ArchiveError(f"{folder / finished.file}: was changed while it was sealed")
@@ -273,12 +270,6 @@ def _put(
         hdf5.put_text(group, name, text)
 
 
-def _by_number(entry: str) -> tuple[int, float]:
-    """Sort key: trial number, then attempt; the last attempt comes last."""
-    _, number, *attempt = entry.split("_")
-    return int(number), int(attempt[1]) if attempt else math.inf
-
-
 def _shown(file: h5py.File, placed: Collection[str], folder: Path, story: Lines) -> str:
     """Name of the entry that a viewer opens first: see `default_plot`; empty if there is none."""
     completed = [n for n, each in story.finished.items() if each.outcome is Outcome.COMPLETED]
@@ -290,6 +281,5 @@ def _shown(file: h5py.File, placed: Collection[str], folder: Path, story: Lines)
     if not with_samples:
         return ""
     plan = parse_plan(folder, read_text(folder / PLAN))
-    followed = planned_in(stages_in(story.entries))
-    best = leading_trial((*plan, *followed), completed, with_samples)
+    best = leading_trial(plan + story.followed, completed, with_samples)
     return "" if best is None else entry_name(best)
