@@ -11,7 +11,7 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.archive.verification.verify_run import verify_run
-from campaign.archive.writing.trial_file import TrialFile
+from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.axis_kind import BOTH_ROTARY
 from campaign.backends import sim
 from campaign.backends.replay import BACKEND as REPLAY
@@ -128,10 +128,10 @@ def test_only_a_channel_with_a_rate_of_its_own_says_so_in_an_archive(tmp_path: P
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_rate_of_its_own_is_a_rate(tmp_path: Path, rate: float) -> None:
     trial = plan_of(tmp_path).trials[0]
-    file = TrialFile(tmp_path, trial)
+    file = TrialWriter(tmp_path, trial, 1, [].append)
     with pytest.raises(BackendError, match="temperature: its own rate"):
         file.start((FAST, info("temperature", own_rate=rate)))
-    file.discard()
+    file.abandon("")
 
 
 def test_a_name_of_a_plug_in_is_archived_and_nothing_more(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from campaign.archive.reading.run_list import find_run, find_runs, list_runs
 from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.summary import RunSummary
 from campaign.archive.writing.run_names import new_run_name, reserved_name
-from campaign.archive.writing.writer import RunWriter, TrialWriter
+from campaign.archive.writing.writer import RunWriter
 
 __all__ = [
     "ArchivedTrial",
@@ -21,7 +21,6 @@ __all__ = [
     "RunStatus",
     "RunSummary",
     "RunWriter",
-    "TrialWriter",
     "find_run",
     "find_runs",
     "list_runs",

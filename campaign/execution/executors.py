@@ -25,7 +25,7 @@ from typing import Protocol, Self
 from campaign import processes
 from campaign.archive import RunWriter
 from campaign.archive.layout.journal import Entry
-from campaign.archive.writing.trial_writer import FolderWriter
+from campaign.archive.writing.folder_writer import FolderWriter
 from campaign.backends.interface import Backend, SupportsTiming
 from campaign.errors import ArchiveError
 from campaign.execution.attempt import AttemptEnd, Conditions, execute_once, execute_together
@@ -42,7 +42,7 @@ FORGOTTEN = 5.0
 FEWEST_FOR_PROCESSES = 300
 """Least number of trials for which processes save more time than their start costs."""
 PRELOADED = (
-    "campaign.archive.writing.trial_file",
+    "campaign.archive.writing.trial_writer",
     "campaign.backends.sim",
     "campaign.execution.executors",
     "campaign.experiments",

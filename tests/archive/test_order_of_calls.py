@@ -18,7 +18,7 @@ from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.files import PART, write_atomically
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
-from campaign.archive.writing.trial_writer import FolderWriter
+from campaign.archive.writing.folder_writer import FolderWriter
 from campaign.estimate import Estimate
 from campaign.reason import Reason
 from campaign.recording import ChannelInfo

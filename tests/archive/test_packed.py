@@ -14,10 +14,10 @@ from campaign.archive import ArchivedTrial, open_run
 from campaign.archive.layout.journal_summary import read_journal
 from campaign.archive.reading.folder import read_trial_file
 from campaign.archive.reading.packed_trial_reader import read_packed
-from campaign.archive.writing import trial_writer
+from campaign.archive.writing import folder_writer
+from campaign.archive.writing.folder_writer import FolderWriter
 from campaign.archive.writing.packed_file import copy_packed
 from campaign.archive.writing.sealed_file import SealedFile
-from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.errors import ArchiveError
 
 COUNT = 70_000  # two chunks and a part of one, and a preview
@@ -222,7 +222,7 @@ def test_a_batch_that_cannot_be_published_leaves_no_file(tmp_path, kit, monkeypa
     def full(files):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(trial_writer, "publish_all", full)
+    monkeypatch.setattr(folder_writer, "publish_all", full)
     with pytest.raises(ArchiveError, match="2 trials are not archived, those before are"):
         writer.publish()
     assert list(tmp_path.iterdir()) == []

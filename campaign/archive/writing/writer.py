@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from campaign.archive.layout.header import PARTIAL, SEALED, RunHeader, RunStatus
 from campaign.archive.layout.journal import (
@@ -25,7 +25,6 @@ from campaign.archive.writing.new_run_folder import make_folder
 from campaign.archive.writing.resume_run import reopen
 from campaign.archive.writing.run_lock import RunLock
 from campaign.archive.writing.run_names import writable
-from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.policy import KEEP_ALL, SampleRetention
@@ -33,7 +32,8 @@ from campaign.recording import Outcome, SafeState
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Trial
 
-__all__ = ["RunWriter", "TrialWriter"]
+if TYPE_CHECKING:
+    from campaign.archive.writing.trial_writer import TrialWriter
 
 
 class RunWriter:
@@ -144,6 +144,8 @@ class RunWriter:
         Execute a trial in one thread at a time. `keeping` decides whether its samples are kept;
         their digests and all other data always are.
         """
+        from campaign.archive.writing.trial_writer import TrialWriter
+
         attempt, note = self.attempt(trial), self.note
         not_kept = keeping.rule(trial, attempt)
         writer = TrialWriter(self._folder, trial, attempt, note, self.timing, not_kept)
