@@ -18,7 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from campaign.archive.writing.trial_file import TrialFile
+from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.trial import ChannelInfo, Ending, Outcome, Task, Trial
 
 RATE = 1000
@@ -41,12 +41,14 @@ def recording(seconds: int) -> tuple[np.ndarray, np.ndarray]:
 def write_ours(folder: Path, times: np.ndarray, block: np.ndarray) -> Path:
     task = Task(mode="rate", duration=times[-1] + 1, window=(0, 1), sample_rate=RATE)
     trial = Trial(number=1, test="speed", kind="none", seed=1, bench={}, task=task)
-    file = TrialFile(folder, trial)
+    notes = []
+    file = TrialWriter(folder, trial, 1, notes.append)
     file.start(tuple(ChannelInfo(f"c{k}", "rad/s", f"Channel {k}", "deg/s") for k in range(12)))
     for start in range(0, len(times), RATE):
         file.append(times[start : start + RATE], block[:, start : start + RATE])
     now = "2026-01-01T00:00:00Z"
-    return folder / file.close(Ending(Outcome.COMPLETED), now, now)[0].file
+    file.finish(Ending(Outcome.COMPLETED), now, now)
+    return folder / notes[0].file
 
 
 def write_with_filters(folder: Path, times: np.ndarray, block: np.ndarray) -> Path:

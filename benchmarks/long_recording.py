@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.journal import RunResumed
 from campaign.archive.verification.verify_run import verify_run
 from campaign.trial import ChannelInfo, Ending, Outcome, Task, Trial
 
@@ -63,7 +64,7 @@ def run(folder: Path, hours: float, channels: int, rate: int) -> dict[str, float
         raise SystemExit("the archive is damaged")
     peaks["verified"] = peak()
     size = sealed.stat().st_size / 1e6
-    writer = RunWriter.resume(sealed, at=NOW, host={}, versions={}, command=())
+    writer = RunWriter.resume(sealed, RunResumed(at=NOW))
     peaks["resumed"] = peak()
     writer.seal(RunStatus.INTERRUPTED, ended=NOW)
     peaks["sealed again"] = peak()

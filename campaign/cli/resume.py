@@ -9,7 +9,7 @@ from pathlib import Path
 
 from campaign.archive import RunReader, RunWriter, find_run, open_run
 from campaign.archive.layout.header import PARTIAL
-from campaign.archive.layout.journal import utc_now
+from campaign.archive.layout.journal import RunResumed, utc_now
 from campaign.archive.layout.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion, say_by_hand
@@ -100,14 +100,14 @@ def resume_run(
 
     def open_archive() -> RunWriter:
         signed = run.sealed and has_signature(run.path)
-        writer = RunWriter.resume(
-            path,
+        resumed = RunResumed(
             at=utc_now(),
             host=provenance.host(),
             versions=provenance.versions(),
             command=provenance.command(),
             changes=remade.changes,
         )
+        writer = RunWriter.resume(path, resumed)
         if signed:
             print_warning(
                 f"{run.name}: was signed; the run changes, so the old signature is renamed"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.journal import RunResumed
 from campaign.policy import SampleRetention
 from campaign.recording import ChannelInfo, Ending, Event, Outcome
 from campaign.trial import Task, Trial
@@ -32,7 +33,7 @@ NORMALISED = {"tests": [{"name": "map", "numbers": [1, 1.0, 1e-300, None, True]}
 FINGERPRINT = hashlib.sha256(
     b'{"tests":[{"name":"map","numbers":[1,1.0,1e-300,null,true]}]}'
 ).hexdigest()
-RESUMED = {"at": "2026-11-22T08:00:00Z", "host": {"name": "other"}, "versions": {}, "command": []}
+RESUMED = RunResumed(at="2026-11-22T08:00:00Z", host={"name": "other"})
 
 
 def make_trial(number: int, test: str = "map") -> Trial:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunReader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.journal import RunResumed
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
@@ -122,7 +123,7 @@ def test_a_run_of_format_3_can_be_gone_on_with(tmp_path, name):
     copy = tmp_path / name
     (shutil.copytree if (KEPT / name).is_dir() else shutil.copy)(KEPT / name, copy)
     at = "2026-11-23T08:00:00+00:00"
-    writer = RunWriter.resume(copy, at=at, host={}, versions={}, command=())
+    writer = RunWriter.resume(copy, RunResumed(at=at))
     assert writer.finished == {1: "completed", 2: "completed", 3: "limit"}
     recorder = writer.begin(open_run(writer.folder).planned(4))
     recorder.finish(Ending(Outcome.FAULT, "no power"), at, at)

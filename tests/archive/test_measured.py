@@ -71,7 +71,7 @@ def test_a_program_that_dies_while_it_measures_has_lost_no_recording(tmp_path: P
     assert child.returncode == -signal.SIGKILL
     (folder,) = tmp_path.glob("*.partial")
     assert verify_run(folder).sound
-    writer = RunWriter.resume(folder, **kit.RESUMED)
+    writer = RunWriter.resume(folder, kit.RESUMED)
     assert writer.finished == {1: Outcome.COMPLETED}  # so it is not executed again
     (trial,) = open_run(writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)).trials
     assert trial.recording()["gyro_rate"].tobytes() == kit.samples(500)[1][1].tobytes()
@@ -105,7 +105,7 @@ def test_metrics_are_the_same_in_folder_file_and_resumed_run(tmp_path: Path, kit
     check(run.trials[0])
     assert run.earlier_attempts[1][0].estimates == FOUND.estimates
     assert verify_run(sealed).sound
-    resumed = RunWriter.resume(sealed, **kit.RESUMED)
+    resumed = RunWriter.resume(sealed, kit.RESUMED)
     check(resumed.archived(1))
     again = resumed.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     check(open_run(again).trials[0])

@@ -16,7 +16,7 @@ import pytest
 
 from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.files import PART, write_atomically
-from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.journal import JOURNAL, RunResumed
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.writing.folder_writer import FolderWriter
 from campaign.estimate import Estimate
@@ -149,7 +149,7 @@ def test_a_resumed_run_says_so_on_the_disk_before_it_goes_on(
     with journal.open("ab") as file:
         file.write(b'{"event": "torn')
     with recorded() as calls:
-        resumed = RunWriter.resume(folder, at=AT, host={}, versions={}, command=["campaign"])
+        resumed = RunWriter.resume(folder, RunResumed(at=AT))
     resumed.close()
     calls.in_order(
         ("truncate", journal), ("fsync", journal), ("write", journal), ("fsync", journal)

@@ -41,7 +41,7 @@ def name(request: pytest.FixtureRequest) -> str:
 def test_an_earlier_and_a_later_format_are_refused_by_whatever_reads_it(tmp_path, name, version):
     path = made(tmp_path, name, version)
     what = f"has format {version}, and this program reads format 3 alone; read it with"
-    for read in (open_run, lambda path: RunWriter.resume(path, **RESUMED)):
+    for read in (open_run, lambda path: RunWriter.resume(path, RESUMED)):
         with pytest.raises(ArchiveError, match=what) as error:
             read(path)
         assert str(error.value).startswith(str(path))
@@ -58,7 +58,7 @@ def test_nothing_is_changed_of_it(tmp_path, name):
     files = [path] if path.is_file() else sorted(path.iterdir())
     before = [file.read_bytes() for file in files]
     with pytest.raises(ArchiveError):
-        RunWriter.resume(path, **RESUMED)
+        RunWriter.resume(path, RESUMED)
     assert [file.read_bytes() for file in files] == before
 
 

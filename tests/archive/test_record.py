@@ -18,6 +18,7 @@ from campaign.archive.layout.record import (
     TrialRecord,
     parse_trees,
     plain,
+    restored_trial,
     shared_trees,
     trees_text,
 )
@@ -118,10 +119,10 @@ def test_what_says_nothing_is_left_out(least):
 def test_a_trial_is_restored_from_its_record_and_the_trees(record, kit):
     described, trees = shared_trees(kit.trial(7))
     assert set(trees) == {described["bench"], described["options"]} == record.tree_names
-    assert record.restored(parse_trees(trees_text(trees))) == kit.trial(7)
+    assert restored_trial(record.trial, parse_trees(trees_text(trees))) == kit.trial(7)
     assert record.fingerprint_of(trees) == kit.trial(7).fingerprint
     with pytest.raises(LookupError):
-        record.restored({})
+        restored_trial(record.trial, {})
 
 
 def test_its_fingerprint_covers_a_truth_and_a_recording(kit, record):

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
-from campaign.archive.layout.journal import JOURNAL, RunResumed
+from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.journal_summary import read_journal
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Ending, Fault, Outcome, SafeState
@@ -99,12 +99,12 @@ def test_a_resumed_run_equals_an_uninterrupted_one(tmp_path, kit, how):
         path = writer.folder
     else:
         path = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
-    writer = RunWriter.resume(path, **RESUMED)
+    writer = RunWriter.resume(path, RESUMED)
     assert writer.finished == {1: Outcome.COMPLETED, 2: Outcome.INTERRUPTED}
     if how == "twice":
         kit.record(writer, trials[1], 600)
         path = writer.seal(RunStatus.FAULT, "no power", ended=kit.ENDED)
-        writer = RunWriter.resume(path, **RESUMED)
+        writer = RunWriter.resume(path, RESUMED)
     resumed = content(finish(writer, trials, kit))
     differing = {
         path for path in expected.keys() | resumed.keys() if expected.get(path) != resumed.get(path)
@@ -118,7 +118,7 @@ def test_a_resumed_run_equals_an_uninterrupted_one(tmp_path, kit, how):
 
 def test_earlier_attempts_are_kept_and_only_the_last_is_analysed(tmp_path, kit):
     path, trials = interrupted(tmp_path, kit)
-    writer = RunWriter.resume(path, **RESUMED)
+    writer = RunWriter.resume(path, RESUMED)
     recorder = writer.begin(trials[1])
     assert recorder.attempt == 2
     told = Ending(
@@ -181,14 +181,15 @@ def test_the_journal_tells_of_decisions_steps_and_the_resume(tmp_path, kit):
     writer.decision("skip", "the limit switch", 2)
     writer.operator_step(3, "Preload the spring to 5 N m", "done")
     path = writer.seal(RunStatus.FAULT, "no power", ended=kit.ENDED)
-    writer = RunWriter.resume(path, **(RESUMED | {"changes": ["versions.numpy: 2.0 → 2.1"]}))
+    changed = RESUMED.model_copy(update={"changes": ("versions.numpy: 2.0 → 2.1",)})
+    writer = RunWriter.resume(path, changed)
     kinds = [type(entry).__name__ for entry in read_journal(writer.folder / JOURNAL).entries]
     assert kinds[-4:] == ["Decision", "OperatorStep", "RunEnded", "RunResumed"]
     run = open_run(writer.folder)
     reason = "the run is in progress or was killed"
     assert (run.status, run.reason) == (RunStatus.INCOMPLETE, reason)
     entries = read_journal(writer.folder / JOURNAL).entries
-    assert entries[-1] == RunResumed(**RESUMED, changes=("versions.numpy: 2.0 → 2.1",))
+    assert entries[-1] == changed
     decision, step = (entry.model_dump(exclude={"event", "at"}) for entry in entries[-4:-2])
     assert decision == {"trial": 2, "decision": "skip", "reason": "the limit switch"}
     assert step == {"trial": 3, "step": "Preload the spring to 5 N m", "answer": "done"}
@@ -202,7 +203,7 @@ def test_a_torn_last_line_is_cut_before_more_is_written(tmp_path, kit):
         journal.write(b'{"at":"2026-11-21T09:3')
     (writer.folder / "trial-00003.trial.part").write_bytes(b"half of it")
     (writer.folder / "trial-00003.trial").write_bytes(b"whole, and never reported")
-    writer = RunWriter.resume(writer.folder, **RESUMED)
+    writer = RunWriter.resume(writer.folder, RESUMED)
     assert {path.name for path in writer.folder.glob("*.part")} <= {"sealed.nxs.part"}
     assert b'09:3{"' not in (writer.folder / JOURNAL).read_bytes()
     run = open_run(finish(writer, trials, kit))
@@ -217,10 +218,10 @@ def test_a_changed_trial_file_is_named_and_nothing_is_touched(tmp_path, kit):
     path.write_bytes(path.read_bytes()[:-1] + b"!")
     before = (writer.folder / JOURNAL).read_bytes()
     with pytest.raises(ArchiveError, match=r"trial-00002\.trial: is not what the journal says"):
-        RunWriter.resume(writer.folder, **RESUMED)
+        RunWriter.resume(writer.folder, RESUMED)
     path.unlink()
     with pytest.raises(ArchiveError, match=r"trial-00002\.trial"):
-        RunWriter.resume(writer.folder, **RESUMED)
+        RunWriter.resume(writer.folder, RESUMED)
     assert (writer.folder / JOURNAL).read_bytes() == before
 
 
@@ -241,33 +242,34 @@ def test_a_damaged_sealed_run_is_not_taken_apart(tmp_path, kit):
         damaged[place] ^= 1
         path.write_bytes(damaged)
         with pytest.raises(ArchiveError, match=f"{told}.*; it is as it was$"):
-            RunWriter.resume(path, **RESUMED)
+            RunWriter.resume(path, RESUMED)
         assert path.read_bytes() == damaged
         assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
 def test_what_has_ended_or_is_no_run_is_refused(tmp_path, kit):
     with pytest.raises(UsageError, match=r"has ended \(complete\)"):
-        RunWriter.resume(kit.run(tmp_path), **RESUMED)
+        RunWriter.resume(kit.run(tmp_path), RESUMED)
     with pytest.raises(UsageError, match="is no run"):
-        RunWriter.resume(tmp_path / "nothing.partial", **RESUMED)
+        RunWriter.resume(tmp_path / "nothing.partial", RESUMED)
 
 
 @pytest.mark.slow
 def test_one_process_at_a_time_writes_a_run(tmp_path, kit):
     writer, trials = begin(tmp_path, kit)
     program = "import sys; from pathlib import Path; from campaign.archive import RunWriter\n"
-    program += f"RunWriter.resume(Path(sys.argv[1]), **{RESUMED})"
+    program += "from campaign.archive.layout.journal import RunResumed\n"
+    program += f"RunWriter.resume(Path(sys.argv[1]), RunResumed(at={RESUMED.at!r}))"
     command = [sys.executable, "-c", program, str(writer.folder)]
     other = subprocess.run(command, capture_output=True, text=True, check=False)
     assert "UsageError" in other.stderr
     assert "another process is writing the run" in other.stderr
     path = finish(writer, trials, kit, RunStatus.FAULT)
-    again = RunWriter.resume(path, **RESUMED)
+    again = RunWriter.resume(path, RESUMED)
     with pytest.raises(UsageError, match="another process"):
-        RunWriter.resume(path.with_suffix(".partial"), **RESUMED)
+        RunWriter.resume(path.with_suffix(".partial"), RESUMED)
     again.close()
-    RunWriter.resume(again.folder, **RESUMED).close()
+    RunWriter.resume(again.folder, RESUMED).close()
 
 
 # Resumes and seals a run again and again, a few trials at a time, until it is killed.
@@ -279,7 +281,7 @@ results = Path(sys.argv[1])
 trials = [kit.make_trial(number) for number in range(1, 1001)]
 print("ready", flush=True)
 while True:
-    writer = RunWriter.resume(find_run(results), **kit.RESUMED)
+    writer = RunWriter.resume(find_run(results), kit.RESUMED)
     for number in range(len(writer.finished) + 1, len(writer.finished) + 4):
         kit.write_trial(writer, trials[number - 1], 37 * number)
         print("finished", number, flush=True)
@@ -339,7 +341,7 @@ def hook(event, arguments):
                 os._exit(9)
 
 def go_on(path):
-    writer = RunWriter.resume(path, **kit.RESUMED)
+    writer = RunWriter.resume(path, kit.RESUMED)
     if 2 not in writer.finished:
         kit.write_trial(writer, kit.make_trial(2), 90)
         os.write(1, b"")
@@ -386,7 +388,7 @@ def fill_up(path, trials, kit):
     """Go on with a run until the disk is full, and seal it; what was told on the way."""
     told = []
     try:
-        writer = RunWriter.resume(path, **RESUMED)
+        writer = RunWriter.resume(path, RESUMED)
     except ArchiveError as error:
         return [str(error)]
     try:
@@ -404,7 +406,7 @@ def fill_up(path, trials, kit):
 @pytest.mark.parametrize("left", [0, 60_000, 300_000, 500_000])
 def test_a_full_disk_leaves_the_run_as_it_was(small_disk, kit, left):
     path, trials = interrupted(small_disk / "results", kit)
-    writer = RunWriter.resume(path, **RESUMED)
+    writer = RunWriter.resume(path, RESUMED)
     kit.record(writer, trials[1], 9000)  # incompressible: 250 kB
     path = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
     before = path.read_bytes()
@@ -419,20 +421,20 @@ def test_a_full_disk_leaves_the_run_as_it_was(small_disk, kit, left):
     run = open_run(find_run(small_disk / "results"))
     assert run.problems() == []
     (small_disk / "filler").unlink()
-    resumed = RunWriter.resume(find_run(small_disk / "results"), **RESUMED)
+    resumed = RunWriter.resume(find_run(small_disk / "results"), RESUMED)
     assert {1, 2} <= set(resumed.finished)
     assert open_run(finish(resumed, trials, kit)).problems() == []
 
 
 def test_a_results_folder_taken_away_is_said(tmp_path, kit):
     path, trials = interrupted(tmp_path / "results", kit)
-    writer = RunWriter.resume(path, **RESUMED)
+    writer = RunWriter.resume(path, RESUMED)
     shutil.move(tmp_path / "results", tmp_path / "elsewhere")
     with pytest.raises(ArchiveError):
         kit.record(writer, trials[1], 10)
     with pytest.raises(ArchiveError, match="could not be sealed"):
         writer.seal(RunStatus.FAULT, "gone", ended=kit.ENDED)
-    resumed = RunWriter.resume(find_run(tmp_path / "elsewhere"), **RESUMED)
+    resumed = RunWriter.resume(find_run(tmp_path / "elsewhere"), RESUMED)
     assert open_run(finish(resumed, trials, kit)).problems() == []
 
 
@@ -472,5 +474,5 @@ def test_a_folder_beside_a_damaged_sealed_file_is_left_alone(tmp_path, kit):
     content[len(content) // 2] ^= 1
     sealed.write_bytes(content)
     with pytest.raises(ArchiveError):
-        RunWriter.resume(sealed, **RESUMED)
+        RunWriter.resume(sealed, RESUMED)
     assert sorted(path.name for path in folder.iterdir()) == before

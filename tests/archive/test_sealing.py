@@ -439,14 +439,12 @@ def test_what_a_user_put_into_the_folder_stays(tmp_path, kit, how):
         return {str(path.relative_to(writer.folder)): path.read_bytes() for path in found}
 
     writer.close()
-    RunWriter.resume(writer.folder, **kit.RESUMED).close()
+    RunWriter.resume(writer.folder, kit.RESUMED).close()
     assert notes.items() <= there().items()
-    path = RunWriter.resume(writer.folder, **kit.RESUMED).seal(
-        RunStatus.INTERRUPTED, ended=kit.ENDED
-    )
+    path = RunWriter.resume(writer.folder, kit.RESUMED).seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
     assert there() == notes
     assert verify_run(path).sound
-    resumed = RunWriter.resume(path, **kit.RESUMED)
+    resumed = RunWriter.resume(path, kit.RESUMED)
     assert notes.items() <= there().items()
     assert not list(tmp_path.glob(f"*{PARTIAL}.part"))
     for trial in trials[1:]:

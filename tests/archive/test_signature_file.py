@@ -43,7 +43,7 @@ def test_what_is_not_sealed_has_no_statement(tmp_path: Path):
 
 def test_a_resume_sets_the_signature_aside_and_the_next_one_takes_another_name(interrupted: Path):
     for number in (1, 2):
-        writer = RunWriter.resume(interrupted, **RESUMED)
+        writer = RunWriter.resume(interrupted, RESUMED)
         aside = interrupted.with_name(f"{interrupted.name}.sig.before-resume-{number}")
         assert aside.read_text() == ("the first\n" if number == 1 else "the second\n")
         assert not signature_path(interrupted).exists()
@@ -62,9 +62,9 @@ def test_a_crash_before_the_signature_was_set_aside_is_made_good_by_the_next_res
     with monkeypatch.context() as patch:
         patch.setattr(resuming_module, "set_aside_signature", crash)
         with pytest.raises(KeyboardInterrupt):
-            RunWriter.resume(interrupted, **RESUMED)
+            RunWriter.resume(interrupted, RESUMED)
     assert signature_path(interrupted).exists()
-    RunWriter.resume(interrupted.with_suffix(".partial"), **RESUMED).close()
+    RunWriter.resume(interrupted.with_suffix(".partial"), RESUMED).close()
     assert not signature_path(interrupted).exists()
 
 
@@ -73,7 +73,7 @@ def test_a_resume_that_fails_leaves_the_signature_where_it_was(interrupted: Path
     content[len(content) // 2] ^= 1
     interrupted.write_bytes(content)
     with pytest.raises(ArchiveError, match="it is as it was"):
-        RunWriter.resume(interrupted, **RESUMED)
+        RunWriter.resume(interrupted, RESUMED)
     assert signature_path(interrupted).read_text() == "the first\n"
 
 

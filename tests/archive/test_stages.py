@@ -58,7 +58,7 @@ def test_they_are_trials_of_the_run_for_every_reader(tmp_path, kit):
 def test_a_sealed_run_is_gone_on_with_and_has_them_again(tmp_path, kit):
     writer, further = begun(tmp_path, kit)
     path = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
-    writer = RunWriter.resume(path, **kit.RESUMED)
+    writer = RunWriter.resume(path, kit.RESUMED)
     assert list(trials_in(read_journal(writer.folder / JOURNAL).stages)) == further
     assert writer.archived(3).trial == further[0]
     assert writer.archived(3).ending.outcome is Outcome.COMPLETED

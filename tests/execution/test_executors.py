@@ -20,7 +20,7 @@ import pytest
 
 from campaign import processes
 from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, RunWriter, open_run
-from campaign.archive.layout.journal import JOURNAL, Decision
+from campaign.archive.layout.journal import JOURNAL, Decision, RunResumed
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.errors import ArchiveError
 from campaign.execution import dask_executor, executors
@@ -131,9 +131,7 @@ def test_a_stop_ends_the_trials_of_processes_and_the_run_goes_on(
     assert outcome.status is RunStatus.INTERRUPTED
     assert stops
     assert len(open_run(outcome.archive).trials) < TRIALS
-    writer = RunWriter.resume(
-        outcome.archive, at="2026-11-21T10:00:00Z", host={}, versions={}, command=()
-    )
+    writer = RunWriter.resume(outcome.archive, RunResumed(at="2026-11-21T10:00:00Z"))
     outcome = run(plan, tmp_path, writer=writer, in_processes=False)
     assert_same(outcome.archive, by_threads)
 
@@ -279,7 +277,7 @@ def test_processes_end_with_a_run_that_is_killed_and_it_goes_on(
         process.kill()
         process.stdout.read()  # to its end: nobody has it open any more
     [folder] = (tmp_path / "results").glob("*.partial")
-    writer = RunWriter.resume(folder, at="2026-11-21T10:00:00Z", host={}, versions={}, command=())
+    writer = RunWriter.resume(folder, RunResumed(at="2026-11-21T10:00:00Z"))
     outcome = run(plan, tmp_path, writer=writer, in_processes=False)
     assert_same(outcome.archive, by_threads)
 

@@ -18,6 +18,7 @@ import pytest
 
 from campaign import signing
 from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive.layout.journal import RunResumed
 from campaign.archive.layout.signature_file import signature_path
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.verification.verify_run import verify_run
@@ -567,8 +568,7 @@ def test_a_run_that_was_opened_and_sealed_again_has_lost_its_signature(
     sealed = writer.seal(RunStatus.INTERRUPTED, "stopped", ended="2026-11-21T09:40:00Z")
     sign(sealed, ada)
     signature = signature_path(sealed).read_bytes()
-    now = {"at": "2026-11-22T08:00:00Z", "host": {}, "versions": {}, "command": []}
-    again = RunWriter.resume(sealed, **now)
+    again = RunWriter.resume(sealed, RunResumed(at="2026-11-22T08:00:00Z"))
     again.seal(RunStatus.INTERRUPTED, "stopped", ended="2026-11-21T09:40:00Z")
     assert open_run(sealed).status is RunStatus.INTERRUPTED
     assert not signature_path(sealed).exists()

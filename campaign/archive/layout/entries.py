@@ -1,4 +1,4 @@
-"""Names of the groups and files of trials.
+"""Names of the groups and files of trials, and their lines of the journal.
 
 NeXus allows no hyphen in a name, so the group of trial `trial-00017` is `trial_00017`. In a sealed
 run, this is the group of the last attempt; a replaced attempt has `trial_00017_attempt_1`.
@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable
 
 from campaign.archive.layout.journal import TrialFinished
+from campaign.archive.layout.record import TrialRecord
 
 TRIAL = ".trial"
 """Suffix of the file of one trial, while its run is in progress."""
@@ -27,6 +28,22 @@ def entry_name(trial_number: int) -> str:
 def file_name(trial_number: int, attempt: int) -> str:
     """Name of a trial's file: `trial-00017.trial`; of a second attempt `trial-00017-2.trial`."""
     return f"trial-{trial_number:05d}{f'-{attempt}' if attempt > 1 else ''}{TRIAL}"
+
+
+def trial_finished(record: TrialRecord, sha256: str, size: int) -> TrialFinished:
+    """The line of the journal for a trial, whose file has this hash and size (bytes)."""
+    return TrialFinished(
+        at=record.ended,
+        trial=record.number,
+        attempt=record.attempt,
+        file=file_name(record.number, record.attempt),
+        sha256=sha256,
+        record=record.sha256,
+        bytes=size,
+        outcome=record.outcome,
+        reason=record.reason,
+        safe_state=record.safe_state,
+    )
 
 
 def entry_names(attempts: Iterable[TrialFinished]) -> dict[str, TrialFinished]:

@@ -123,11 +123,4 @@ class PlannedTrial(ArchivedModel):
 
     @classmethod
     def of(cls, trial: Trial) -> Self:
-        return cls(
-            number=trial.number,
-            test=trial.test,
-            kind=trial.kind,
-            role=trial.role,
-            label=trial.label,
-            fingerprint=trial.fingerprint,
-        )
+        return cls.model_validate(trial, from_attributes=True)

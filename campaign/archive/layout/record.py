@@ -128,10 +128,6 @@ class TrialRecord(ArchivedModel):
         """The announced channels."""
         return tuple(channel.info for channel in self.channels)
 
-    def restored(self, trees: Trees) -> Trial:
-        """The trial. Raises LookupError if a tree is missing, ValueError if it is invalid."""
-        return restored_trial(self.trial, trees)
-
     def fingerprint_of(self, trees: Trees) -> str:
         """The fingerprint of the trial as stored.
 
@@ -154,7 +150,7 @@ class TrialRecord(ArchivedModel):
 
 
 def restored_trial(described: Tree, trees: Trees) -> Trial:
-    """Inverse of `shared_trees`. Raises LookupError, ValueError."""
+    """Inverse of `shared_trees`. Raises LookupError if a tree is missing, ValueError."""
     own: dict[str, JsonValue] = {**described, **{name: {} for name in SHARED}}
     shared = {name: trees[str(described[name])] for name in SHARED}
     # The trees were checked against their digests; validating them again takes the most time.

@@ -11,7 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive.layout.header import SEALED
-from campaign.archive.layout.record import SeriesRecord, Trees, TrialRecord, series_of
+from campaign.archive.layout.record import (
+    SeriesRecord,
+    Trees,
+    TrialRecord,
+    restored_trial,
+    series_of,
+)
 from campaign.archive.layout.run_folder import first_line
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_trial import ArchivedTrial
@@ -205,7 +211,7 @@ def archived_trial(samples: RecordedSamples, trees: Trees) -> ArchivedTrial:
     """The trial of a record. Raises ArchiveError if a part of it is missing or invalid."""
     place = f"{samples.path}: /{samples.entry}"
     try:
-        trial = samples.record.restored(trees)
+        trial = restored_trial(samples.record.trial, trees)
     except LookupError:
         raise ArchiveError(f"{place}: its bench or its options cannot be read") from None
     except ValueError as error:

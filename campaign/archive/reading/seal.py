@@ -7,7 +7,7 @@ the whole run. A signature signs this digest.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import h5py
@@ -60,8 +60,8 @@ class SealedTexts:
         self._path = path
         self._run = safe_hdf5.inner_group(file, "run")
         self.root, self.seal = "", None
-        with damaged.noting(), safe_hdf5.guarded(path, f"/run/{SEAL}"):
-            text = safe_hdf5.text_at(*self._parent(SEAL))
+        with damaged.noting(), self._at(SEAL) as member:
+            text = safe_hdf5.text_at(*member)
             try:
                 self.seal = Seal.model_validate_json(text)
             except ValidationError as error:
@@ -89,46 +89,40 @@ class SealedTexts:
 
     def raw(self, place: str) -> bytes:
         """A text of `/run` in UTF-8, e.g. `journal/data`. Raises ArchiveError if damaged."""
-        with safe_hdf5.guarded(self._path, f"/run/{place}"):
-            parent, name = self._parent(place)
-            return safe_hdf5.raw_text_at(parent, name, self._digest(place))
+        with self._at(place) as member:
+            return safe_hdf5.raw_text_at(*member, self._digest(place))
 
     def unchecked(self, place: str) -> bytes:
         """A text of `/run` in UTF-8 without a check; empty if it cannot be read."""
-        with (
-            contextlib.suppress(ArchiveError),
-            safe_hdf5.guarded(self._path, f"/run/{place}"),
-        ):
-            return safe_hdf5.unchecked_raw_text_at(*self._parent(place))
+        with contextlib.suppress(ArchiveError), self._at(place) as member:
+            return safe_hdf5.unchecked_raw_text_at(*member)
         return b""
 
     def line_digests(self, place: str) -> list[str]:
         """SHA-256 of each line of a text of `/run`; empty if it cannot be read."""
-        with (
-            contextlib.suppress(ArchiveError),
-            safe_hdf5.guarded(self._path, f"/run/{place}"),
-        ):
-            return list(safe_hdf5.line_digests_at(*self._parent(place)))
+        with contextlib.suppress(ArchiveError), self._at(place) as member:
+            return list(safe_hdf5.line_digests_at(*member))
         return []
 
     def integer(self, place: str) -> int:
         """An integer of `/run`. Raises ArchiveError if it is damaged."""
-        with safe_hdf5.guarded(self._path, f"/run/{place}"):
-            parent, name = self._parent(place)
-            return safe_hdf5.integer_at(parent, name, self._digest(place))
+        with self._at(place) as member:
+            return safe_hdf5.integer_at(*member, self._digest(place))
 
     def check(self, place: str) -> None:
         """Check a text or a number of `/run`. Raises ArchiveError if it is damaged."""
         if place in NUMBERS:
             self.integer(place)
         else:
-            with safe_hdf5.guarded(self._path, f"/run/{place}"):
-                parent, name = self._parent(place)
-                safe_hdf5.check_text_at(parent, name, self._digest(place))
+            with self._at(place) as member:
+                safe_hdf5.check_text_at(*member, self._digest(place))
 
-    def _parent(self, place: str) -> tuple[h5py.Group, str]:
-        group, _, name = place.rpartition("/")
-        return (safe_hdf5.inner_group(self._run, group) if group else self._run), name
+    @contextlib.contextmanager
+    def _at(self, place: str) -> Iterator[tuple[h5py.Group, str]]:
+        """Group and name of a member of `/run`; failures in the block are ArchiveErrors."""
+        with safe_hdf5.guarded(self._path, f"/run/{place}"):
+            group, _, name = place.rpartition("/")
+            yield (safe_hdf5.inner_group(self._run, group) if group else self._run), name
 
     def _digest(self, place: str) -> str | None:
         if self.seal is None or place in OUTSIDE:

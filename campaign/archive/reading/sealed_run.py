@@ -11,7 +11,7 @@ from pathlib import Path
 
 import h5py
 
-from campaign.archive.layout.entries import entry_name, entry_names, file_name
+from campaign.archive.layout.entries import entry_name, entry_names, trial_finished
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import SEALED, PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import RunStarted, TrialFinished
@@ -280,7 +280,8 @@ class _Trials:
         attempts = {(each.trial, each.attempt): each for each in self.story.attempts}
         for digest in self.lines.keys() - {each.record for each in attempts.values()}:
             line = self.index[self.lines[digest]]
-            finished = _as_finished(parse_record(self.path, "/run/index", line))
+            record = parse_record(self.path, "/run/index", line)
+            finished = trial_finished(record, "0" * 64, 0)  # file hash and size are unknown
             attempts.setdefault((finished.trial, finished.attempt), finished)
         return entry_names(attempts.values())
 
@@ -301,22 +302,6 @@ class _Trials:
             )
         archived = archived_trial(RecordedSamples(self.path, entry, record, not_kept), trees)
         return with_metrics(archived, self.story.measured_of(finished.record))
-
-
-def _as_finished(record: TrialRecord) -> TrialFinished:
-    """A lost line of the journal, rebuilt from the index; file hash and size are unknown."""
-    return TrialFinished(
-        at=record.ended,
-        trial=record.number,
-        attempt=record.attempt,
-        file=file_name(record.number, record.attempt),
-        sha256="0" * 64,
-        record=record.sha256,
-        bytes=0,
-        outcome=record.outcome,
-        reason=record.reason,
-        safe_state=record.safe_state,
-    )
 
 
 def check_identity(path: Path, entry: str, record: TrialRecord, finished: TrialFinished) -> None:

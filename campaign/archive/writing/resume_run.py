@@ -54,16 +54,13 @@ def _locked(folder: Path) -> Iterator[RunLock]:
     """Acquire the run's lock; release it if the block fails."""
     try:
         lock = RunLock.acquire(folder.parent, folder.stem)
+        try:
+            yield lock
+        except BaseException:
+            lock.release()
+            raise
     except OSError as error:
         raise ArchiveError(f"{folder}: cannot be gone on with: {why(error)}") from None
-    try:
-        yield lock
-    except OSError as error:
-        lock.release()
-        raise ArchiveError(f"{folder}: cannot be gone on with: {why(error)}") from None
-    except BaseException:
-        lock.release()
-        raise
 
 
 def _check_sealed(sealed: Path) -> None:

@@ -222,18 +222,18 @@ def _texts(folder: Path, header: RunHeader, story: Lines, ended: RunEnded) -> di
     }
     for field, value in header.model_dump(mode="json", exclude={"sources"}).items():
         texts[f"provenance/{field}"] = value if isinstance(value, str) else canonical_json(value)
-    toml, lines = "application/toml", "application/jsonl"
+
+    def copied(name: str, size: int | None = None) -> str | LongText:
+        return text_of(partial(file_pieces, folder / name, size))
+
+    lines = "application/jsonl"
     notes = {
-        f"source_{number:03d}": _note(toml, name, text)
+        f"source_{number:03d}": _note("application/toml", name, text)
         for number, (name, text) in enumerate(sorted(header.sources.items()), start=1)
     } | {
-        "journal": _note(
-            lines, JOURNAL, text_of(partial(file_pieces, folder / JOURNAL, story.size))
-        ),
-        "plan": _note(lines, PLAN, text_of(partial(file_pieces, folder / PLAN))),
-        "plan_trials": _note(
-            lines, PLAN_TRIALS, text_of(partial(file_pieces, folder / PLAN_TRIALS))
-        ),
+        "journal": _note(lines, JOURNAL, copied(JOURNAL, story.size)),
+        "plan": _note(lines, PLAN, copied(PLAN)),
+        "plan_trials": _note(lines, PLAN_TRIALS, copied(PLAN_TRIALS)),
         "trees": _note(lines, PLAN_TREES, ""),
         "index": _note(lines, "index.jsonl", ""),
     }

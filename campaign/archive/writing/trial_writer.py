@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive.layout.checksums import series_digest
-from campaign.archive.layout.entries import entry_name, file_name
+from campaign.archive.layout.entries import entry_name, file_name, trial_finished
 from campaign.archive.layout.files import PART, publish, why
 from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished, utc_now
 from campaign.archive.layout.packed_trial import PackedSeries, PackedTrial
@@ -232,19 +232,7 @@ class TrialWriter:
             if self._whole is None
             else MemorySamples(*place, rows=self._whole)
         )
-        finished = TrialFinished(
-            at=ended,
-            trial=self._trial.number,
-            attempt=self.attempt,
-            file=self._final.name,
-            sha256=digest,
-            record=record.sha256,
-            bytes=size,
-            outcome=ending.outcome,
-            reason=ending.reason,
-            safe_state=ending.safe_state,
-        )
-        return finished, trial_of_record(self._trial, kept)
+        return trial_finished(record, digest, size), trial_of_record(self._trial, kept)
 
     def _discard(self) -> None:
         """Remove the file. Never fails: by its name, a remaining file is not an archive."""

@@ -83,16 +83,7 @@ class RunWriter:
         return cls(folder, journal, lock)
 
     @classmethod
-    def resume(
-        cls,
-        path: Path,
-        *,
-        at: str,
-        host: Mapping[str, str],
-        versions: Mapping[str, str],
-        command: Sequence[str],
-        changes: Sequence[str] = (),
-    ) -> Self:
+    def resume(cls, path: Path, resumed: RunResumed) -> Self:
         """Resume a run that was interrupted, killed or ended by a fault.
 
         A sealed run is replaced by its folder. `finished` lists the finished trials. A repeated
@@ -100,7 +91,7 @@ class RunWriter:
 
         Args:
             path: the folder, or the sealed file.
-            at, host, versions, command, changes: for the journal; see `journal.RunResumed`.
+            resumed: line for the journal.
 
         Raises:
             UsageError: the run cannot be resumed, or another process writes it.
@@ -113,15 +104,7 @@ class RunWriter:
             writer._sealer.add(finished)
         writer._measured = {digest: line.start for digest, line in story.measured.items()}
         try:
-            journal.append(
-                RunResumed(
-                    at=at,
-                    host=dict(host),
-                    versions=dict(versions),
-                    command=tuple(command),
-                    changes=tuple(changes),
-                )
-            )
+            journal.append(resumed)
         except BaseException:
             writer.close()
             raise
