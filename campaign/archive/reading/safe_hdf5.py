@@ -109,9 +109,7 @@ def _stated_size(path: Path) -> int:
 
 def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
     """The group `name`, stored in this file, of the NeXus class."""
-    group = own(parent, name)
-    if not isinstance(group, h5py.Group):
-        raise ArchiveError(f"{place_of(parent, name)}: is not a group")
+    group = inner_group(parent, name)
     if attribute(group, "NX_class") != nx_class:
         raise ArchiveError(f"{place_of(parent, name)}: is not of class {nx_class}")
     return group
@@ -127,12 +125,12 @@ def inner_group(parent: h5py.Group, name: str) -> h5py.Group:
 
 def member(parent: h5py.Group, name: str) -> h5py.Group | None:
     """The group `name`, of any class; None if it is a dataset. No link is followed."""
-    item = own(parent, name)
-    if isinstance(item, h5py.Dataset):
+    item = own_id(parent, name)
+    if isinstance(item, h5d.DatasetID):
         return None
-    if not isinstance(item, h5py.Group):
+    if not isinstance(item, h5g.GroupID):
         raise ArchiveError(f"{place_of(parent, name)}: is neither a group nor a dataset")
-    return item
+    return h5py.Group(item)
 
 
 def check_dataset(parent: h5py.Group, name: str) -> int:
@@ -224,7 +222,7 @@ def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:
     """The file's own hash, and its offset and length in the file."""
     *groups, name = path.split("/")
     for group in groups:
-        parent = own(parent, group)
+        parent = inner_group(parent, group)
     dataset = _dataset_at(parent, name)
     offset = dataset.id.get_offset()
     if dataset.shape != () or dataset.dtype != np.dtype("S64") or offset is None:
@@ -302,16 +300,11 @@ def _attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> h5a.AttrID:
     return identifier
 
 
-def own(parent: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
-    """The direct member `name` of `parent`; no link is followed."""
-    item = own_id(parent, name)
-    if isinstance(item, h5g.GroupID):
-        return h5py.Group(item)
-    return h5py.Dataset(item) if isinstance(item, h5d.DatasetID) else None
-
-
 def own_id(parent: h5py.Group, name: str) -> Any:
-    """As `own`, by HDF5's low-level interface: faster for tens of thousands of objects."""
+    """The direct member `name` of `parent`; no link is followed.
+
+    It is an object of HDF5's low-level interface: faster for tens of thousands of objects.
+    """
     raw = name.encode()
     if "/" in name or name == ".":  # of a path, only the last link would be checked
         raise ArchiveError(f"{place_of(parent, name)}: is a path, not a name")
