@@ -7,15 +7,12 @@ from datetime import UTC, datetime
 import pytest
 from pydantic import ValidationError
 
-from campaign.archive import (
-    RunHeader,
-    RunStatus,
-    RunWriter,
-    find_run,
-    list_runs,
-    new_run_name,
-    open_run,
-)
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run, list_runs
+from campaign.archive.writing.run_names import new_run_name
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import UsageError
 from campaign.trial import Ending, Outcome
 

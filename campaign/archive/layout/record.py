@@ -20,6 +20,8 @@ from pydantic import Field, JsonValue
 
 from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.header import ArchivedModel
+from campaign.archive.layout.journal import TrialFinished
+from campaign.archive.layout.names import file_name
 from campaign.estimate import Estimate, Window
 from campaign.recording import ChannelInfo, Ending, Fault, Outcome, SafeState
 from campaign.trial import Tree, Trial, canonical_json, fingerprint, tree_text
@@ -225,3 +227,19 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
     return str(value)
+
+
+def trial_finished(record: TrialRecord, sha256: str, size: int) -> TrialFinished:
+    """The line of the journal for a trial, whose file has this hash and size (bytes)."""
+    return TrialFinished(
+        at=record.ended,
+        trial=record.number,
+        attempt=record.attempt,
+        file=file_name(record.number, record.attempt),
+        sha256=sha256,
+        record=record.sha256,
+        bytes=size,
+        outcome=record.outcome,
+        reason=record.reason,
+        safe_state=record.safe_state,
+    )

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.names import SEALED
 from campaign.archive.layout.record import (
     SeriesRecord,
     Trees,

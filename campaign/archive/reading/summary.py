@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-from campaign.archive.layout.header import PARTIAL, SEALED, RunHeader, RunStatus
-from campaign.archive.layout.journal import JOURNAL, RunStarted
-from campaign.archive.layout.journal_summary import read_lines
-from campaign.archive.layout.run_folder import read_header
-from campaign.errors import ArchiveError
+from campaign.archive.layout.run_status import RunStatus
+
+if TYPE_CHECKING:
+    from campaign.archive.layout.header import RunHeader
 
 
 @dataclass(frozen=True)
@@ -66,46 +65,3 @@ class RunSummary:
             benches=tuple(dict.fromkeys(bench for bench in benches if isinstance(bench, str))),
             tags=header.tags,
         )
-
-
-def summarise(path: Path) -> RunSummary:
-    """Summarize a run without its trials; errors become its `problem`."""
-    size = 0
-    try:
-        if path.is_dir():
-            size = sum(file.stat().st_size for file in path.iterdir())
-            run = _summary_of_folder(path)
-        else:
-            from campaign.archive.reading import sealed_run
-
-            size = path.stat().st_size
-            run = sealed_run.read_summary(path)
-    except (ArchiveError, OSError) as error:
-        sealed = path.with_suffix(SEALED)
-        if path.suffix == PARTIAL and sealed.is_file():
-            return summarise(sealed)  # sealed during the reading
-        if isinstance(error, ArchiveError):
-            return RunSummary(path.stem, path, size, problem=str(error))
-        return RunSummary(
-            path.stem, path, size, problem=f"{error.filename or path}: {error.strerror}"
-        )
-    return replace(run, bytes=size)
-
-
-def _summary_of_folder(folder: Path) -> RunSummary:
-    header = read_header(folder)
-    story = read_lines((folder / JOURNAL).read_bytes())
-    if not story.all(RunStarted):
-        raise ArchiveError(f"{folder / JOURNAL}: has no line of the start of the run")
-    finished, ended = story.finished.values(), story.ended
-    planned = header.trials + len(story.followed)
-    return replace(
-        RunSummary.of_header(folder, header),
-        planned=planned,
-        status=ended.status if ended else RunStatus.INCOMPLETE,
-        ended=ended.at if ended else "",
-        trials=len(finished),
-        failed=sum(each.outcome.failed for each in finished),
-        interrupted=story.interrupted,
-        untold=max(0, planned - len(finished)) if story.damaged else 0,
-    )
