@@ -16,8 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.trial import ChannelInfo, Ending, Outcome, Task, Trial
 
 NOW = "2026-01-01T00:00:00Z"

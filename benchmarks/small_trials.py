@@ -24,7 +24,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it
 
 import numpy as np
 
-from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.physics.bench import Bench
 from campaign.signals import Sine

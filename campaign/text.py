@@ -214,3 +214,10 @@ def nearest(word: object, names: Iterable[str]) -> str:
 def words(name: str) -> str:
     """`coulomb positive`."""
     return name.replace("_", " ")
+
+
+def clock(seconds: float) -> str:
+    """`0:42`, `12:05`, `3:07:30`."""
+    minutes, second = divmod(round(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"

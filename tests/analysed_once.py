@@ -12,7 +12,7 @@ from types import ModuleType
 import pytest
 
 from campaign.api.analysis import AnalysedTest, analyse_run
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.experiments.interface import Experiment
 
 Known = dict[tuple[object, ...], tuple[AnalysedTest, ...]]

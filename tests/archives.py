@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.results import RunResults
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.writing.results_file import prepare_results
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import Backend
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments

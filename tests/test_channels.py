@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.trial_file import TrialFile
 from campaign.axis_kind import BOTH_ROTARY

@@ -15,7 +15,7 @@ import pytest
 
 import campaign
 from campaign.api.estimates import findings_table
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.errors import UsageError
 from campaign.estimate import Estimate, Systematic
 from campaign.reason import Cause

@@ -19,9 +19,9 @@ import pytest
 
 import campaign
 from campaign.api.results import results_of
-from campaign.archive import open_run
-from campaign.archive.layout.results import results_path
+from campaign.archive.layout.names import results_path
 from campaign.archive.layout.results_text import from_text, to_text
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.results_file import read_results
 from campaign.cli.report import report_run
 from campaign.errors import ArchiveError, ExitCode, UsageError
@@ -329,7 +329,7 @@ def test_key_numbers_are_findings_and_conditions_may_be_called_anything(run):
 
 @pytest.mark.slow
 def test_a_run_in_progress_has_results_of_what_there_is(tmp_path):
-    from campaign.archive import RunWriter
+    from campaign.archive.writing.writer import RunWriter
     from campaign.backends.sim import SimBackend, SimOptions
     from campaign.protocol import as_tree
     from tests.archives import _header, plan_of

@@ -14,7 +14,8 @@ from campaign.api.results import Results
 from campaign.api.run import RunView
 from campaign.api.test import TestView
 from campaign.api.trial import TrialView
-from campaign.archive import find_run, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 
 __all__ = ["Results", "RunView", "TestView", "TrialView", "open_view"]
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
 
-from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials, of_test
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.sound_samples import Trials, damaged_records, without_damaged
 from campaign.axis_kind import BOTH_ROTARY, Sides, in_axis_terms
 from campaign.errors import ArchiveError, UsageError, explain_in_debug

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from campaign.api.analysis import TestAnalysis, analyse_run, published_of
-from campaign.archive import RunReader
 from campaign.archive.layout.results import RunResults
+from campaign.archive.reading.run_reader import RunReader
 from campaign.experiments import experiments
 
 if TYPE_CHECKING:

@@ -24,10 +24,11 @@ from campaign.api.damage_warnings import report_damage, warn
 from campaign.api.estimates import findings_table
 from campaign.api.plots import plot
 from campaign.api.tables import result_table
-from campaign.archive import RunReader
-from campaign.archive.layout.results import ResultsOfTest, RunResults, results_path
+from campaign.archive.layout.names import results_path
+from campaign.archive.layout.results import ResultsOfTest, RunResults
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_words
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
 from campaign.experiments import experiments
 from campaign.published.scoreboard import Line, Scoreboard, score

@@ -15,9 +15,11 @@ from campaign.api.results import Results, results_view
 from campaign.api.tables import metrics_by_trial, trials_table
 from campaign.api.test import TestView
 from campaign.api.trial import TrialView
-from campaign.archive import RunHeader, RunReader, RunStatus
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_words, lost_trials, of_test
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Outcome
 from campaign.trial import trial_number

@@ -12,7 +12,7 @@ from campaign.api.damage_warnings import report_damage
 from campaign.api.estimates import findings_table, metrics_table
 from campaign.api.tables import result_table, trials_table
 from campaign.api.trial import TrialView
-from campaign.archive import ArchivedTrial
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.sound_samples import Trials, without_damaged
 from campaign.errors import UsageError

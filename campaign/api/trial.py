@@ -7,7 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from campaign.api.estimates import metrics_table
-from campaign.archive import ArchivedTrial
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.errors import UsageError
 from campaign.recording import Ending, Recording

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Protocol, runtime_checkable
 
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.options import Options
 from campaign.recording import Ending, PanicStop, Recorder, SafeState
 from campaign.stopwatch import Timing

@@ -19,8 +19,11 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage_words import in_one_line, in_words, lost_trials
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.sound_samples import whole_recording
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.errors import ArchiveError

@@ -8,11 +8,13 @@ from datetime import UTC, datetime, timedelta
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from campaign.archive import RunStatus, RunSummary, list_runs
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.run_list import list_runs
+from campaign.archive.reading.summary import RunSummary
 from campaign.archive.writing.remnants import find_remnants
 from campaign.cli.output import bytes_text, print_json, print_note, print_table, print_warning
 from campaign.errors import UsageError
-from campaign.execution.display import clock
+from campaign.text import clock
 
 _HEADINGS = (
     "run", "status", "date", "duration", "trials", "failed", "protocol", "backend", "tags", "size",

@@ -14,13 +14,14 @@ from pathlib import Path
 from campaign.backends.interface import BackendKind
 from campaign.cli.output import print_note, print_warning
 from campaign.errors import CampaignError, ExitCode, UsageError
-from campaign.execution.display import Shown, clock
+from campaign.execution.display import Shown
 from campaign.execution.operator_prompts import UNATTENDED, Attendance, wait_unless
 from campaign.options import Options
 from campaign.plain_text import storable
 from campaign.protocol import PlannedTest
 from campaign.protocol.limit_check import sought_instability
 from campaign.protocol.stages import most_of
+from campaign.text import clock
 from campaign.trial import Trial
 
 GLANCE = 0.2

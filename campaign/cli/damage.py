@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from campaign.archive import RunWriter
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import heading, in_words, listed
 from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import Backend, ServesArchive
 from campaign.cli.output import print_warning
 from campaign.errors import ExitCode

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from campaign.api import RunView
-from campaign.archive import find_run, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.errors import ExitCode, UsageError

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from campaign.api.estimate_text import of_unknown_size
-from campaign.archive import find_run
 from campaign.archive.layout.files import why, write_atomically
+from campaign.archive.reading.run_list import find_run
 from campaign.axis_kind import axis_terms
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_note, print_table, print_warning, waiting

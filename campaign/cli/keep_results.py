@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from campaign.api.results import results_of
-from campaign.archive import RunReader
-from campaign.archive.layout.results import results_path
+from campaign.archive.layout.names import results_path
 from campaign.archive.reading.results_file import OtherLayoutError, read_any_results
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.writing.results_file import PreparedResults, prepare_results
 from campaign.cli.output import print_warning
 from campaign.errors import ArchiveError, UsageError

@@ -10,8 +10,8 @@ from campaign.backends.interface import Backend, SupportsExternalStop
 from campaign.cli.ask import has_terminal, read_line
 from campaign.cli.output import print_note
 from campaign.errors import BackendError, CampaignError, ExitCode
-from campaign.execution.display import clock
 from campaign.recording import PanicStop
+from campaign.text import clock
 
 
 class StillStoppedError(CampaignError):

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from campaign.archive import new_run_name
+from campaign.archive.writing.run_names import new_run_name
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, sides_in
 from campaign.backends.interface import Backend, ExecutesTogether, KnowsCost
 from campaign.cli.damage import archive_of, say_damaged
@@ -23,7 +23,6 @@ from campaign.cli.output import (
 )
 from campaign.cli.prepare import PreparedRun, Request, lacking, prepare
 from campaign.errors import ExitCode
-from campaign.execution.display import clock
 from campaign.experiments import experiments
 from campaign.experiments.analysis import lost_without
 from campaign.options import describe
@@ -40,7 +39,7 @@ from campaign.protocol import (
 )
 from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.stages import most_of
-from campaign.text import count
+from campaign.text import clock, count
 from campaign.trial import Most, Role, Trial
 from campaign.units import Quantity, convert
 

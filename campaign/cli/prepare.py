@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from campaign.archive import find_run
+from campaign.archive.reading.run_list import find_run
 from campaign.backends import backends, calls
 from campaign.backends.interface import Backend, BackendKind, SimulatesTruth, Source
 from campaign.channels import explained, missing

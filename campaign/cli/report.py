@@ -12,7 +12,9 @@ from pathlib import Path, PurePosixPath
 from shlex import quote
 from typing import TYPE_CHECKING, cast
 
-from campaign.archive import RunReader, find_run, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.cli.output import print_note, print_table, print_warning
 from campaign.errors import DEBUG, ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.interrupts import unwinding

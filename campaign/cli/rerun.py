@@ -6,19 +6,17 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
-from campaign.archive import (
-    ArchivedTrial,
-    RunHeader,
-    RunReader,
-    RunStatus,
-    RunWriter,
-    find_run,
-    open_run,
-    reserved_name,
-)
-from campaign.archive.layout.header import PARTIAL
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.names import PARTIAL
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage_words import heading, in_words, lost_trials
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.sound_samples import whole_recording
+from campaign.archive.writing.run_names import reserved_name
+from campaign.archive.writing.writer import RunWriter
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE
 from campaign.cli.output import print_line, print_note
 from campaign.cli.prepare import find_backend, open_backend

@@ -7,10 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from campaign.archive import RunReader, RunWriter, find_run, open_run
-from campaign.archive.layout.header import PARTIAL
 from campaign.archive.layout.journal import utc_now
+from campaign.archive.layout.names import PARTIAL
 from campaign.archive.layout.signature_file import has_signature
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion, say_by_hand
 from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled

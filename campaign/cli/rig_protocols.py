@@ -12,7 +12,6 @@ from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms, sides_in
 from campaign.cli.output import print_line, print_warning
 from campaign.cli.plan import chosen_lines, in_short
 from campaign.errors import CampaignError, UsageError, writing
-from campaign.execution.display import clock
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
 from campaign.experiments.shared.rig import Rig
@@ -22,6 +21,7 @@ from campaign.physics.complete import lacking
 from campaign.protocol import Plan, check_limits, check_loops, load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench
 from campaign.resources import protocols_folder
+from campaign.text import clock
 
 WIDTH = 98
 TEMPLATES = Path(__file__).with_name("rig_protocol_templates")

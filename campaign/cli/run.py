@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from campaign.archive import RunHeader, RunWriter, reserved_name
-from campaign.archive.layout.header import PARTIAL, Truth
+from campaign.archive.layout.header import RunHeader, Truth
+from campaign.archive.layout.names import PARTIAL
+from campaign.archive.writing.run_names import reserved_name
+from campaign.archive.writing.writer import RunWriter
 from campaign.cli.ask import allow_motion, say_by_hand
 from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings

@@ -12,9 +12,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from campaign.archive import RunReader, RunStatus, RunWriter
-from campaign.archive.layout.header import SEALED
 from campaign.archive.layout.journal import TrialsFollowed
+from campaign.archive.layout.names import SEALED
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends import calls
 from campaign.backends.interface import Backend, BackendKind, SupportsHolder, SupportsTiming
 from campaign.cli.ask import attendance_of
@@ -26,7 +28,7 @@ from campaign.cli.run_options import DEFAULTS, RunOptions, in_processes
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, worst_exit_code
-from campaign.execution.display import Shown, clock, progress_display
+from campaign.execution.display import Shown, progress_display
 from campaign.execution.executors import OpenExecutor, process_executor
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.run_reference import how_to_go_on, reference, typed
@@ -50,7 +52,7 @@ from campaign.policy import Policy
 from campaign.protocol import PlannedStage
 from campaign.recording import Outcome
 from campaign.stopwatch import UNTIMED, Timing, Work
-from campaign.text import count
+from campaign.text import clock, count
 from campaign.trial import Trial
 
 

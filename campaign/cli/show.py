@@ -9,7 +9,6 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.layout.header import Truth
 from campaign.archive.layout.journal import (
     Decision,
@@ -22,6 +21,9 @@ from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.layout.record import plain
 from campaign.archive.layout.signature_file import has_signature, signature_path
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import on_a_terminal, print_json, print_line, print_table
 from campaign.errors import ExitCode

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from campaign import signing
-from campaign.archive import find_run
 from campaign.archive.layout.files import why
 from campaign.archive.layout.signature_file import (
     has_signature,
@@ -15,6 +14,7 @@ from campaign.archive.layout.signature_file import (
     signature_path,
     write_signature,
 )
+from campaign.archive.reading.run_list import find_run
 from campaign.archive.writing.run_lock import RunLock
 from campaign.cli.ask import has_terminal
 from campaign.cli.output import print_line, print_note, print_warning

@@ -9,11 +9,11 @@ from typing import Any
 from campaign.cli.latch import latch_text
 from campaign.cli.output import print_json, print_line
 from campaign.errors import BackendError, ExitCode
-from campaign.execution.display import clock
 from campaign.link.panic import panic_stop_of
 from campaign.link.port import Port, open_port
 from campaign.link.safe import SafeWatch
 from campaign.plain_text import printable
+from campaign.text import clock
 from campaign.wire.messages import Holder, Latch, Nak, Query, Status, framed
 
 INTERVAL = 0.1

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from pydantic import JsonValue
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends.step_check import CHANGE
 from campaign.cli.output import print_note, print_warning
 from campaign.options import Options

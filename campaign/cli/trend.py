@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
-from campaign.archive import find_run, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_table, print_warning
 from campaign.errors import ExitCode, UsageError, worst_exit_code

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign import signing
-from campaign.archive import find_runs
 from campaign.archive.layout.signature_file import has_signature, read_signature, signature_path
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_words
 from campaign.archive.reading.results_file import OtherLayoutError, holds_results, read_any_results
+from campaign.archive.reading.run_list import find_runs
 from campaign.archive.verification.result import Verification
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.verification.verify_run import verify_run

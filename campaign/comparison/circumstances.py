@@ -11,7 +11,7 @@ from typing import Any
 
 from campaign.api.analysis import AnalysedTest
 from campaign.api.quantity_words import option_quantity, plain
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.comparison.same_quantity import PairedTest, Pairing
 from campaign.physics.bench import Bench
 from campaign.physics.bench_knowledge import number_at

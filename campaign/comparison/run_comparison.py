@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, run_title
-from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import BOTH_ROTARY, in_axis_terms
 from campaign.comparison.circumstances import Change, changes
 from campaign.comparison.finding_pairs import Pair, pairs_of

@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from campaign import processes
-from campaign.archive import RunWriter
 from campaign.archive.layout.files import PART, keep_umask, publish_all
 from campaign.archive.writing.trial_file import lost_trial
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends import backends, calls
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError, UsageError

@@ -16,6 +16,7 @@ from rich.text import Text
 from campaign.execution.progress import Progress
 from campaign.plain_text import printable
 from campaign.recording import Ending
+from campaign.text import clock
 from campaign.trial import Trial
 
 PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
@@ -188,13 +189,6 @@ def time_left(progress: Progress) -> str:
 def standing(progress: Progress) -> str:
     """Counts and remaining time, in one line."""
     return ", ".join(filter(None, (counts(progress), time_left(progress))))
-
-
-def clock(seconds: float) -> str:
-    """`0:42`, `12:05`, `3:07:30`."""
-    minutes, second = divmod(round(seconds), 60)
-    hours, minute = divmod(minutes, 60)
-    return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"
 
 
 def _failure(ended: tuple[Trial, Ending] | None) -> Text | None:

@@ -23,9 +23,9 @@ from queue import SimpleQueue
 from typing import Protocol, Self
 
 from campaign import processes
-from campaign.archive import RunWriter
 from campaign.archive.layout.journal import Entry
 from campaign.archive.writing.trial_writer import FolderWriter
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import Backend, SupportsTiming
 from campaign.errors import ArchiveError
 from campaign.execution.attempt import AttemptEnd, Conditions, execute_once, execute_together

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from campaign.archive import RunWriter
+from campaign.archive.writing.writer import RunWriter
 from campaign.trial import Trial
 
 Stop = Callable[[], bool]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ExitCode, worst_exit_code
 from campaign.recording import Outcome, SafeState
 

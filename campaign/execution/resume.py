@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from campaign.archive import PlannedTrial, RunHeader, RunReader
+from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal import Decision, TrialFinished
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.writing.resume_run import RESUMABLE
 from campaign.errors import ArchiveError, UsageError
 from campaign.execution.provenance import shaping

@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from campaign.archive import RunWriter
-from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import utc_now
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_metrics import Measure
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attempt import Conditions
 from campaign.execution.executors import OpenExecutor, thread_executor

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, wait
 from queue import Empty, SimpleQueue
 
-from campaign.archive import RunWriter
 from campaign.archive.layout.journal import Entry
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import AttemptEnd
 from campaign.execution.batches import Batches

@@ -13,10 +13,11 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.followup_trials import trials_followed
 from campaign.archive.layout.journal import TrialsFollowed, utc_now
 from campaign.archive.reading.archived_metrics import Measure
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.writing.writer import RunWriter
 from campaign.axis_kind import each_in_axis_terms
 from campaign.backends import calls
 from campaign.backends.interface import Backend

@@ -10,7 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial, RunReader, find_run, open_run
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import UsageError
 from campaign.trial import Outcome, Role
 

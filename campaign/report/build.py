@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
-from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import listed
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.report.content import lines

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from campaign.api.analysis import AnalysedTest
-from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import UsageError
 from campaign.report.content.trial_choice import executed_trials
 from campaign.report.formats import chosen_formats

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from campaign import processes
-from campaign.archive import RunReader
 from campaign.archive.reading.global_heap_check import Looked, add_known_heaps, known_heaps
+from campaign.archive.reading.run_reader import RunReader
 from campaign.trial import Tree
 
 if TYPE_CHECKING:

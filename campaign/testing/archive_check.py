@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import RunHeader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import CampaignError
 from campaign.recording import ChannelInfo, Recording, SafeState
 from campaign.testing.backend_under_test import CheckFailedError, require

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_metrics import Measure
 from campaign.backends.interface import Backend, StopFlag
 from campaign.execution.attempt import Conditions, execute_once

@@ -10,8 +10,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, source_of
-from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import BOTH_ROTARY, Sides, in_axis_terms
 from campaign.comparison.circumstances import Change, changes
 from campaign.comparison.draws import SIMULATION

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import in_axis_terms
 from campaign.channels import TEMPERATURE
 from campaign.comparison.circumstances import Change as Circumstance

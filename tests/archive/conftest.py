@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.writing.writer import RunWriter
 from campaign.policy import SampleRetention
 from campaign.recording import ChannelInfo, Ending, Event, Outcome
 from campaign.trial import Task, Trial

@@ -13,7 +13,8 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from campaign.archive import list_runs, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import list_runs
 from campaign.archive.reading.sound_samples import whole_recording
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from campaign.archive import open_run
 from campaign.archive.layout.checksums import BLOCK, SeriesDigest, series_digest, text_digest
 from campaign.archive.layout.packed_trial import PackedTrial
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.series import file_series
 from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from tests.archive.forging import canonical, sha256

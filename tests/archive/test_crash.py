@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
-from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run, list_runs
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Ending, Outcome
 

@@ -8,9 +8,11 @@ import pytest
 import xarray
 from nexusformat.nexus import nxload
 
-from campaign.archive import PlannedTrial, RunStatus, RunWriter
+from campaign.archive.layout.header import PlannedTrial
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.default_plot import leading_trial
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import CHANNELS
 from campaign.recording import Ending, Outcome
 from campaign.signals import Sine

@@ -20,8 +20,9 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, open_run
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.sound_samples import whole_recording
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.verification.verify_run import verify_run

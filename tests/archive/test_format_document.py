@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunHeader
+from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.storage import CHUNK
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "developers" / "archive-format.md"

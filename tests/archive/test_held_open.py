@@ -7,8 +7,10 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunReader, list_runs, open_run
 from campaign.archive.reading import global_heap_check, safe_hdf5
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import list_runs
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
 from tests.archive.test_kept import KEPT
 

@@ -5,8 +5,10 @@ import os
 
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, list_runs
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.index import INDEX
+from campaign.archive.reading.run_list import list_runs
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import UsageError
 
 
@@ -24,7 +26,7 @@ def not_opened(monkeypatch):
     def summarise(path):
         raise AssertionError(f"{path} was opened")
 
-    monkeypatch.setattr("campaign.archive.reading.index.summarise", summarise)
+    monkeypatch.setattr("campaign.archive.reading.summarise.summarise", summarise)
 
 
 def test_a_second_listing_opens_nothing_and_says_the_same(results, monkeypatch):

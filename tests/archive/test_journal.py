@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import (
     Decision,
     Entry,
@@ -28,6 +27,7 @@ from campaign.archive.layout.journal import (
     TrialFinished,
 )
 from campaign.archive.layout.journal_summary import read_journal, read_lines
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome, SafeState
 

@@ -8,8 +8,11 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunReader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
 from campaign.reason import Reason

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 import campaign
-from campaign.archive import RunStatus, open_run
 from campaign.archive.layout import journal_summary
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading import sealed_run
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.reading.lazy_trials import Outline
+from campaign.archive.reading.open_run import open_run
 from campaign.cli.show import show_archive
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate

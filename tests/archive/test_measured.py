@@ -11,10 +11,13 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import ArchivedTrial, RunStatus, RunWriter, open_run
-from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.estimate import Estimate, Systematic
 from campaign.policy import SampleRetention
 from campaign.reason import Cause, Reason

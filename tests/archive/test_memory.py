@@ -11,10 +11,11 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunStatus, RunWriter
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing import sealed_file
 from campaign.archive.writing.long_text import SHORT
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention
 from campaign.recording import Ending, Event, Outcome

@@ -12,10 +12,11 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.layout.storage import CHUNK
 from campaign.archive.writing.nexus import VERSION, definition_path
 from campaign.archive.writing.preview import PREVIEW_POINTS
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import CHANNELS
 from tests.forks import Forks
 

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.files import PART, write_atomically
-from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.names import JOURNAL
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.writing.trial_writer import FolderWriter
+from campaign.archive.writing.writer import RunWriter
 from campaign.estimate import Estimate
 from campaign.reason import Reason
 from campaign.recording import ChannelInfo

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import ArchivedTrial, open_run
 from campaign.archive.layout.journal_summary import read_journal
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.folder import read_trial_file
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.packed_trial_reader import read_packed
 from campaign.archive.writing import trial_writer
 from campaign.archive.writing.packed_file import copy_packed

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, open_run
 from campaign.archive.layout.record import (
     EventRecord,
     PreviewRecord,
@@ -21,7 +20,9 @@ from campaign.archive.layout.record import (
     shared_trees,
     trees_text,
 )
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_samples import RecordedSamples, archived_trial
+from campaign.archive.reading.open_run import open_run
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
 from campaign.policy import SampleRetention

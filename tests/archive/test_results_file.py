@@ -18,11 +18,13 @@ import xarray
 from h5py import h5o
 from nexusformat.nexus import nxload
 
-from campaign.archive import find_run, list_runs, open_run
 from campaign.archive.layout.files import sha256_of
-from campaign.archive.layout.results import ENTRY, HASH, ResultsOfTest, RunResults, results_path
+from campaign.archive.layout.names import results_path
+from campaign.archive.layout.results import ENTRY, HASH, ResultsOfTest, RunResults
 from campaign.archive.layout.results_text import from_text, to_text
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.results_file import OtherLayoutError, read_results
+from campaign.archive.reading.run_list import find_run, list_runs
 from campaign.cli.keep_results import _found_when_whole
 from campaign.cli.verify import _of_results
 from campaign.errors import ArchiveError, UsageError

@@ -14,9 +14,13 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
-from campaign.archive.layout.journal import JOURNAL, RunResumed
+from campaign.archive.layout.journal import RunResumed
 from campaign.archive.layout.journal_summary import read_journal
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run, list_runs
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Ending, Fault, Outcome, SafeState
 from tests.archive.conftest import RESUMED

@@ -8,8 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, open_run
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.layout.storage import CHUNK
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.preview import PREVIEW_POINTS
 from campaign.recording import Ending, Outcome, SafeState

@@ -13,7 +13,9 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunReader, RunStatus, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention

@@ -10,11 +10,13 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.journal_summary import read_journal
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.sealed_file import SealedFile
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import CHANNELS
 from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention

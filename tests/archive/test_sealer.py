@@ -8,12 +8,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from campaign.archive import RunWriter
-from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal import TrialFinished
 from campaign.archive.layout.journal_summary import read_journal
-from campaign.archive.layout.run_folder import SEALING
+from campaign.archive.layout.names import JOURNAL, SEALING
 from campaign.archive.writing import seal_run
 from campaign.archive.writing.sealed_file import SealedFile
+from campaign.archive.writing.writer import RunWriter
 
 ALL = ["trial_00001", "trial_00002", "trial_00003"]
 

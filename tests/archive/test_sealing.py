@@ -13,16 +13,16 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, open_run
-from campaign.archive.layout.header import PARTIAL
-from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.journal_summary import read_journal
-from campaign.archive.layout.run_folder import SEALING
+from campaign.archive.layout.names import JOURNAL, PARTIAL, SEALING
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading import in_parts
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.series import Series
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing import packed_file, seal_run, sealed_entry, sealed_file
 from campaign.archive.writing.sealed_entry import EntryWriter
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError
 from campaign.recording import ChannelInfo, Ending, Outcome
 from tests.archive.forging import put_integer, put_text, text_of

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, find_run, list_runs
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.layout.signature_file import (
     LARGEST,
     read_signature,
@@ -16,8 +16,10 @@ from campaign.archive.layout.signature_file import (
     signature_path,
     write_signature,
 )
+from campaign.archive.reading.run_list import find_run, list_runs
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.writing import resume_run as resuming_module
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError, UsageError
 from tests.archive.conftest import RESUMED
 

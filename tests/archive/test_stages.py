@@ -4,11 +4,15 @@ import json
 
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, list_runs, open_run
 from campaign.archive.layout.followup_trials import stages_in, trials_followed, trials_in
-from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.layout.journal import TrialsFollowed
 from campaign.archive.layout.journal_summary import read_journal
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import list_runs
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome
 

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.stopwatch import Timing, Work
 from tests.archives import plan_of

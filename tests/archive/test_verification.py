@@ -11,9 +11,10 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, open_run
-from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading import in_parts
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.verification import entries
 from campaign.archive.verification.result import STRUCTURE, UNFINISHED
 from campaign.archive.verification.verify_run import verify_run

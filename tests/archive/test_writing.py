@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from campaign.archive import RunWriter
 from campaign.archive.layout.storage import CHUNK, pack
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.reading.packed_trial_reader import read_packed
 from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import Preview
 from campaign.archive.writing.trial_writer import FolderWriter
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import BackendError
 from campaign.recording import ChannelInfo
 

@@ -20,7 +20,8 @@ import numpy as np
 import pytest
 from typer.main import get_command
 
-from campaign.archive import RunReader, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.verification.verify_run import verify_run
 from campaign.backends import backends
 from campaign.cli import app, main

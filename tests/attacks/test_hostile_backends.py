@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.errors import ExitCode
 from campaign.execution.safety import NOT_SAFE

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ExitCode
 from campaign.recording import Outcome, SafeState
 from campaign.wire.fields import Writer

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import campaign
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends.replay import BACKEND, ReplayOptions
 from campaign.protocol import as_tree
 from campaign.recording import (

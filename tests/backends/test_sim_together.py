@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends.interface import ExecutesTogether, KnowsCost
 from campaign.backends.sim import BACKEND, SimBackend, SimOptions
 from campaign.cli import compile_engine

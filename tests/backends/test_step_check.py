@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.backends.step_check import CHANGE, STEP, StepCheck
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording

@@ -12,7 +12,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.writing.writer import RunWriter
 from campaign.cli.identify import identify_run
 from campaign.cli.import_command import import_recordings
 from campaign.experiments.interface import Experiment, TestData

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from campaign.archive import find_run, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 from campaign.cli import compare as command
 from campaign.cli.compare import compare_archives
 from campaign.comparison.run_comparison import compare_runs

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.comparison.run_comparison import Comparison, compare_runs
 from campaign.comparison.tables import alone_table, change_of, headline, sentences
 from campaign.errors import UsageError

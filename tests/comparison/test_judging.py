@@ -11,7 +11,7 @@ from scipy import stats
 
 from campaign.api.analysis import AnalysedTest
 from campaign.api.quantity_words import condition_words
-from campaign.archive import ArchivedTrial
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.comparison.finding_pairs import pairs_of
 from campaign.comparison.same_quantity import pair_tests
 from campaign.comparison.tables import change_of

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.comparison.page import article_of, write_comparison
 from campaign.comparison.run_comparison import Comparison, compare_runs
 from campaign.errors import UsageError

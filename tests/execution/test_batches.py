@@ -10,7 +10,7 @@ from itertools import chain
 import numpy as np
 import pytest
 
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.batches import LOOK_AHEAD, Batches
 from campaign.recording import Ending, Outcome, Recorder, SafeState

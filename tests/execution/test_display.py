@@ -7,10 +7,13 @@ import io
 import pytest
 from rich.console import Console
 
-from campaign.archive import RunHeader, RunWriter, list_runs
-from campaign.execution.display import PlainDisplay, clock, counts, live_display, progress_display
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.reading.run_list import list_runs
+from campaign.archive.writing.writer import RunWriter
+from campaign.execution.display import PlainDisplay, counts, live_display, progress_display
 from campaign.execution.progress import Ledger, Progress
 from campaign.recording import Ending, Outcome
+from campaign.text import clock
 from tests.execution.fakes import COMPLETED, make_trials
 
 NOW = "2026-11-21T09:37:00Z"

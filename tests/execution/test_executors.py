@@ -19,8 +19,14 @@ from pathlib import Path
 import pytest
 
 from campaign import processes
-from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, RunWriter, open_run
-from campaign.archive.layout.journal import JOURNAL, Decision
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.journal import Decision
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.errors import ArchiveError
 from campaign.execution import dask_executor, executors

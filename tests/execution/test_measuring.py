@@ -15,11 +15,15 @@ import pytest
 
 import campaign
 from campaign.api.analysis import analyse_run
-from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.journal import Decision
 from campaign.archive.layout.journal_summary import read_lines
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.layout.storage import CHUNK
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import LOAD_RATE
 from campaign.cli.show import show_archive

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ExitCode
 from campaign.execution.operator_prompts import wait_unless
 from campaign.execution.stop import StopSwitch

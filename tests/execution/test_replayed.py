@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial, RunHeader, RunWriter, open_run
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.replay import BACKEND, ReplayOptions
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode, UsageError
 from campaign.execution import sequence
 from campaign.execution.progress import Progress

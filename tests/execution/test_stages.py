@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from campaign.archive.layout.followup_trials import trials_in
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ExitCode
 from campaign.execution.operator_prompts import Attendance, SimulatedOperator
 from campaign.execution.outcome import RunOutcome

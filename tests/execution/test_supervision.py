@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from campaign.archive.layout.header import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_metrics import ArchivedMetrics, Measure
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.backends import calls

@@ -15,7 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, find_run, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 from campaign.channels import info
 from campaign.execution.progress import Progress
 from campaign.execution.watch_display import AFTERWARDS, MOST, Trace, WatchDisplay, drawn

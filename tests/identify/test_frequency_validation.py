@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import ArchivedTrial
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.errors import UsageError

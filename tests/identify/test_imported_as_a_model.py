@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from campaign.api.analysis import analyse_run
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError
 from campaign.estimate import Estimate

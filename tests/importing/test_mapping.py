@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends import backends
 from campaign.backends.imported import BACKEND
 from campaign.backends.replay import ReplayOptions

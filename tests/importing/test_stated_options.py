@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.cli.import_command import import_recordings
 from campaign.cli.run_options import RunOptions
 from campaign.errors import ExitCode

@@ -259,7 +259,9 @@ def test_no_archive_is_larger_than_the_plan_says(desk, tmp_path) -> None:
     """Noise cannot be compressed: the largest archive that the trials can have."""
     import numpy as np
 
-    from campaign.archive import RunHeader, RunStatus, RunWriter
+    from campaign.archive.layout.header import RunHeader
+    from campaign.archive.layout.run_status import RunStatus
+    from campaign.archive.writing.writer import RunWriter
     from campaign.backends.sim import CHANNELS
     from campaign.recording import Ending, Outcome
 

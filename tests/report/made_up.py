@@ -8,9 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial, PlannedTrial, RunHeader, RunReader, RunStatus
 from campaign.archive.layout.full_plan import FullPlan
+from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal_summary import read_lines
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options

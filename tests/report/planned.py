@@ -7,7 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from campaign.api.analysis import AnalysedTest
-from campaign.archive import RunHeader
+from campaign.archive.layout.header import RunHeader
 from campaign.experiments import experiments
 from campaign.experiments.interface import bench_of
 from campaign.protocol import load_protocol, make_plan

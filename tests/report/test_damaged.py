@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from campaign.api.analysis import AnalysedTest, analyse_run
-from campaign.archive import RunHeader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.sound_samples import damaged_records
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options
 from campaign.recording import ChannelInfo, Ending, Outcome

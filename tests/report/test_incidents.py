@@ -8,7 +8,6 @@ from types import ModuleType
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import (
     Decision,
     OperatorStep,
@@ -17,6 +16,8 @@ from campaign.archive.layout.journal import (
     TrialsFollowed,
 )
 from campaign.archive.layout.journal_summary import read_lines
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
 from campaign.recording import Channel, Ending, Fault, Outcome, Recording, SafeState
 from campaign.report.build import render

@@ -12,9 +12,12 @@ from urllib.parse import unquote
 
 import pytest
 
-from campaign.archive import RunHeader, RunStatus, RunSummary, RunWriter
-from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.reading.summary import summarise
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.summarise import summarise
+from campaign.archive.reading.summary import RunSummary
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import UsageError
 from campaign.report.index.page import entry_of, render, write_index
 from campaign.report.index.report_summary import summary_of_report
@@ -175,7 +178,7 @@ def test_trials_of_which_nobody_knows_are_not_told_as_not_executed(
 ):
     header = RunHeader(name="a", created="2026-11-21T09:00:00+00:00", trials=3)
     folder = RunWriter.create(tmp_path, header, ()).folder
-    monkeypatch.setattr("campaign.archive.reading.summary.read_header", lambda _: header)
+    monkeypatch.setattr("campaign.archive.reading.summarise.read_header", lambda _: header)
     entry = entry_of(summarise(folder))
     assert entry.verdict == ("0 of 3 trials completed, 3 not executed.",)
     with (folder / JOURNAL).open("ab") as journal:
@@ -281,7 +284,7 @@ def test_runs_are_the_newest_first_and_none_is_opened_twice(results: Path, monke
         raise AssertionError(f"{path} was read again")
 
     (results / 'bad "& <b>.nxs').unlink()
-    monkeypatch.setattr("campaign.archive.reading.index.summarise", opened)
+    monkeypatch.setattr("campaign.archive.reading.summarise.summarise", opened)
     render(results, templates_folder())
 
 

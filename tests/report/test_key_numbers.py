@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import BOTH_ROTARY
 from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.experiments.interface import key

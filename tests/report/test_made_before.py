@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from campaign import processes as worker
-from campaign.archive.layout.results import results_path
+from campaign.archive.layout.names import results_path
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
 from campaign.gc_threshold import GC_THRESHOLD

@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment, TestData
 from campaign.reason import NONE, Reason

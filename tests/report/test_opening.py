@@ -12,8 +12,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from campaign.archive import RunReader, RunStatus
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.run_reader import RunReader
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment, TestData
 from campaign.published.headline import is_compared, once

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.lines import Line2D
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.report.content.document import document_of

@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from campaign.api.analysis import TestAnalysis, analyse_run
-from campaign.archive import open_run
 from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.reading import sealed_run, summary
+from campaign.archive.reading.open_run import open_run
 from campaign.experiments import experiments
 from campaign.report import processes
 from campaign.report.build import render

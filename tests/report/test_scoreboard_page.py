@@ -14,9 +14,9 @@ from types import ModuleType
 import pytest
 
 from campaign.api.analysis import analyse_run, published_of
-from campaign.archive import RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.archive.layout.journal_summary import read_lines
+from campaign.archive.reading.run_reader import RunReader
 from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.experiments.interface import Experiment
 from campaign.published.provenance import OF_A_TRUTH

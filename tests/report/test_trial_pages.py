@@ -12,9 +12,13 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
+from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.journal import Decision, TrialFinished
 from campaign.archive.layout.journal_summary import read_lines
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.writing.writer import RunWriter
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate, Window

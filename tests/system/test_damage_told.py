@@ -16,11 +16,14 @@ import numpy as np
 import pytest
 
 import campaign
-from campaign.archive import ArchivedTrial, RunWriter, find_run, open_run
 from campaign.archive.layout.journal import Decision
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_one_line
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 from campaign.archive.reading.sound_samples import readable, without_damaged
+from campaign.archive.writing.writer import RunWriter
 from campaign.errors import ArchiveError
 from campaign.export import exports
 from campaign.export.run_export import export_run

@@ -11,7 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import RunReader, RunStatus, find_run, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import UsageError
 from campaign.execution import dask_executor
 from campaign.execution.dask_executor import _scheduler

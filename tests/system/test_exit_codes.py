@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import RunWriter
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends.sim import SimBackend
 from campaign.cli.ask import NotStartedError
 from campaign.cli.prepare import Request

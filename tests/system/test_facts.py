@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.physics.complete import PURPOSES
 from tests.link.controllers import controller
 from tests.system.user import campaign

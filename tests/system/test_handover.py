@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from tests.forks import Begun
 from tests.system.user import Process, campaign, command, environment, forks, write
 

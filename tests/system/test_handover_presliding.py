@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from tests.estimation.bristle_plants import Interface, Truth
 from tests.system.user import campaign, write
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import campaign
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.cli.prepare import Request, prepare
 from campaign.cli.rerun import rerun_trial
 from campaign.cli.run import run_protocol

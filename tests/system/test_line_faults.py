@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
 from campaign.errors import ExitCode
 from campaign.recording import Fault, Outcome, Recording, SafeState
 from tests.link.bad_line import Block, Trouble, bad_line, schedule

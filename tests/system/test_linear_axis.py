@@ -16,7 +16,7 @@ import pytest
 
 import campaign as program
 from campaign.api.analysis import analyse_run
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends.sim import BACKEND, SimOptions
 from campaign.comparison.shared_systematics import shared_sources
 from campaign.experiments import experiments

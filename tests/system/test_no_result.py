@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunReader, open_run
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.channels import LOAD_RATE
 from campaign.cli.identify import identify_run
 from campaign.cli.report import report_run

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
 from campaign.archive.layout.journal import Decision
+from campaign.archive.reading.open_run import open_run
 from campaign.cli.stop import stop_bench
 from campaign.errors import ExitCode
 from campaign.wire.codes import Kind

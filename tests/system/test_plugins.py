@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from tests.forks import MODULES
 from tests.packages import FILM, Packages
 from tests.system.user import SEA

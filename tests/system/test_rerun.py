@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.cli.prepare import Request
 from campaign.cli.rerun import _error, rerun_trial
 from campaign.cli.run import run_protocol

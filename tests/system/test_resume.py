@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
 from campaign.archive.layout.journal import Decision, RunResumed
-from campaign.archive.layout.run_folder import PLAN
+from campaign.archive.layout.names import PLAN
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.writing.unseal_run import unseal
 from campaign.backends.serial import SerialOptions
 from campaign.backends.sim import SimBackend

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
 from campaign.execution.recorder import LATE
 from campaign.link.port import open_port
 from campaign.link.safe import SafeWatch, is_safe

@@ -17,11 +17,13 @@ import h5py
 import pytest
 
 from campaign import signing
-from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.layout.signature_file import signature_path
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.run_lock import RunLock
+from campaign.archive.writing.writer import RunWriter
 from campaign.backends import sim
 from campaign.cli.prepare import Request
 from campaign.cli.resume import resume_run

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import RunStatus, find_run, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 from campaign.archive.verification.verify_run import verify_run
 from tests.archive.test_resuming import content, documented_differences
 from tests.system.user import environment, forks, write

@@ -12,7 +12,9 @@ from pathlib import Path
 import pytest
 
 import campaign as program
-from campaign.archive import RunReader, find_run, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.verification.verify_run import verify_run
 from campaign.cli import session
 from campaign.errors import ExitCode, UsageError

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import RunReader, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.recording import Fault, Outcome, SafeState
 from campaign.wire.messages import State
 from tests.link.controllers import controller

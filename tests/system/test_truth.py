@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from campaign.api import analysis
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends.sim import SimBackend
 from campaign.cli.rerun import rerun_trial
 from campaign.cli.show import show_archive

@@ -18,10 +18,12 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 import campaign
-from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.layout.journal import Decision
-from campaign.archive.layout.results import results_path
+from campaign.archive.layout.names import results_path
+from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.results_file import read_results
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.cli.bench_commands import app
 from campaign.errors import ArchiveError, CampaignError
 from campaign.recording import Recording

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.archive import find_run, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run
 from campaign.recording import Fault, Outcome, SafeState
 from campaign.testing import backend_checks
 from tests.forks import MODULES, forks_of

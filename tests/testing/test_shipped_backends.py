@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.backends.replay import BACKEND as REPLAY
 from campaign.backends.replay import ReplayOptions
 from campaign.backends.serial import BACKEND as SERIAL

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.archive.layout.header import RunHeader
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.writing.writer import RunWriter
 from campaign.experiments import experiments
 from campaign.protocol import as_tree, load_protocol, make_plan
 from campaign.resources import protocols_folder

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from campaign.archive import RunReader, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import AxisKind, Sides
 from campaign.cli.trend import _command, _exchange
 from campaign.errors import UsageError

@@ -13,7 +13,8 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunReader, open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments import experiments
 from campaign.report.formats.as_json import plain

@@ -14,14 +14,12 @@ from pathlib import Path
 
 from campaign.archive.layout.files import write_lines_atomically
 from campaign.archive.layout.followup_trials import trials_in
-from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.layout.journal import TrialsFollowed
+from campaign.archive.layout.names import JOURNAL, PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.record import parse_trees, restored_trial, shared_trees, trees_text
 from campaign.archive.layout.run_folder import first_line
 from campaign.errors import ArchiveError
 from campaign.trial import Tree, Trial, canonical_json
-
-PLAN_TRIALS = "plan-trials.jsonl"
-PLAN_TREES = "plan-trees.jsonl"
 
 
 def write_full_plan(folder: Path, trials: Sequence[Trial]) -> None:

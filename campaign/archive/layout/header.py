@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from datetime import datetime
-from enum import StrEnum
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -13,19 +12,6 @@ from campaign.trial import Role, Tree, Trial
 
 FORMAT = 3
 """Version of the archive format (`docs/developers/archive-format.md`); the only readable one."""
-
-SEALED = ".nxs"
-PARTIAL = ".partial"
-
-
-class RunStatus(StrEnum):
-    """Status of a run. Sealing writes every status except `INCOMPLETE`."""
-
-    COMPLETE = "complete"  # every planned trial completed
-    FAILED_TRIALS = "failed trials"  # the plan was executed; some trials did not complete
-    INTERRUPTED = "interrupted"  # an operator stopped it
-    FAULT = "fault"  # the backend, the bench or the archive failed
-    INCOMPLETE = "incomplete"  # in progress, or killed: no end is recorded
 
 
 def _run_name(name: str) -> str:

@@ -17,13 +17,12 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_serializer
 
 from campaign.archive.layout.files import why
-from campaign.archive.layout.header import PlannedTrial, RunStatus
+from campaign.archive.layout.header import PlannedTrial
+from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
 from campaign.recording import Outcome, SafeState
 from campaign.trial import Tree, canonical_json
-
-JOURNAL = "journal.jsonl"
 
 _ESTIMATE = TypeAdapter(Estimate)
 

@@ -7,12 +7,9 @@ program version, and another version may give other results.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
-from campaign.archive.layout.header import PARTIAL, SEALED
 from campaign.result import Result, Table
 
-ENDING = f"-results{SEALED}"
 FORMAT = 2
 """Version of the layout (`docs/results-as-data.md`)."""
 ENTRY = "results"
@@ -69,9 +66,3 @@ class RunResults:
     damaged: tuple[str, ...] = ()
     published: Table | None = None
     telling: tuple[str, str] | None = None
-
-
-def results_path(run: Path) -> Path:
-    """Path of the results of the run at `run`, a file or a folder."""
-    name = run.name.removesuffix(SEALED).removesuffix(PARTIAL)
-    return run.with_name(f"{name}{ENDING}")

@@ -10,13 +10,9 @@ from pydantic import TypeAdapter, ValidationError
 from campaign.archive.layout.files import read_errors, why
 from campaign.archive.layout.header import FORMAT, PlannedTrial, RunHeader
 from campaign.archive.layout.json_lines import parse_at_once
+from campaign.archive.layout.names import HEADER
 from campaign.errors import ArchiveError
 from campaign.trial import canonical_json
-
-HEADER = "run.json"
-PLAN = "plan.jsonl"
-SEALING = "sealed.nxs.part"
-"""The sealed file while it is written."""
 
 _PLANNED = TypeAdapter(list[PlannedTrial])
 

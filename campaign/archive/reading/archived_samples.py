@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.names import SEALED
 from campaign.archive.layout.record import SeriesRecord, Trees, TrialRecord, series_of
 from campaign.archive.layout.run_folder import first_line
 from campaign.archive.reading import safe_hdf5

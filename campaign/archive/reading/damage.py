@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self, TypeVar
 
-from campaign.archive.layout.entries import TRIAL_FILE
+from campaign.archive.layout.names import TRIAL_FILE
 from campaign.errors import ArchiveError
 
 _Read = TypeVar("_Read")

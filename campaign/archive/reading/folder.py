@@ -5,14 +5,24 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import read_errors
 from campaign.archive.layout.followup_trials import planned_in, stages_in
-from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
-from campaign.archive.layout.header import PARTIAL, PlannedTrial, RunStatus
-from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished
+from campaign.archive.layout.full_plan import FullPlan
+from campaign.archive.layout.header import PlannedTrial
+from campaign.archive.layout.journal import RunStarted, TrialFinished
 from campaign.archive.layout.journal_summary import Lines, read_lines
-from campaign.archive.layout.run_folder import PLAN, parse_plan, read_header, read_text
+from campaign.archive.layout.names import (
+    ENTRY,
+    JOURNAL,
+    PARTIAL,
+    PLAN,
+    PLAN_TREES,
+    PLAN_TRIALS,
+    entry_name,
+    entry_names,
+)
+from campaign.archive.layout.run_folder import parse_plan, read_header, read_text
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_metrics import measured_in, with_metrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList

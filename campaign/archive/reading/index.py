@@ -14,9 +14,8 @@ from typing import Self
 
 from pydantic import BaseModel
 
-from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.layout.run_folder import HEADER
-from campaign.archive.reading.summary import RunSummary, summarise
+from campaign.archive.layout.names import HEADER, JOURNAL
+from campaign.archive.reading.summary import RunSummary
 
 INDEX = ".campaign-index.json"
 _VERSION = 4
@@ -62,12 +61,12 @@ class Index:
         try:
             stamp = _stamp(path)
         except OSError:
-            return summarise(path)
+            return _read(path)
         known = self._known.get(path.name)
         if known is not None and known.stamp == stamp and known.summary.name == path.stem:
             summary = replace(known.summary, path=path)
         else:
-            summary = summarise(path)
+            summary = _read(path)
         if not summary.problem:  # what could not be read may be readable by now
             kept = replace(summary, path=Path(path.name))  # the folder may be moved
             self._used[path.name] = _Entry(stamp=stamp, summary=kept)
@@ -90,6 +89,12 @@ class Index:
         except (OSError, ValueError):  # ValueError: a file name that is not UTF-8
             with contextlib.suppress(OSError):
                 part.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> RunSummary:
+    from campaign.archive.reading.summarise import summarise  # late: reading a run imports numpy
+
+    return summarise(path)
 
 
 def _version() -> tuple[int, str]:

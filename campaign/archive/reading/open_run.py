@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from campaign.archive.layout.files import PART, why
-from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.names import SEALED
 from campaign.archive.reading.folder import open_folder
 from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError

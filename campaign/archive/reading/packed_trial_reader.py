@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.names import SEALED
 from campaign.archive.layout.packed_trial import MAGIC, POINTER, PackedSeries, PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees, series_of
 from campaign.archive.layout.run_folder import first_line

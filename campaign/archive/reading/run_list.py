@@ -8,8 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from campaign.archive.layout.files import PART
-from campaign.archive.layout.header import PARTIAL, SEALED
-from campaign.archive.layout.results import ENDING, results_path
+from campaign.archive.layout.names import PARTIAL, RESULTS, SEALED, results_path
 from campaign.archive.reading.index import Index
 from campaign.archive.reading.summary import RunSummary
 from campaign.errors import UsageError
@@ -55,14 +54,14 @@ def _without_results(paths: list[Path]) -> list[Path]:
     A run may have such a name, too. A file with unclear content counts as results if the run that
     belongs to its name is beside it.
     """
-    if not any(path.name.endswith(ENDING) for path in paths):
+    if not any(path.name.endswith(RESULTS) for path in paths):
         return paths
     from campaign.archive.reading.results_file import holds_results
 
     beside = {results_path(path) for path in paths}
 
     def is_run(path: Path) -> bool:
-        if not path.name.endswith(ENDING):
+        if not path.name.endswith(RESULTS):
             return True
         results = holds_results(path)
         return path not in beside if results is None else not results

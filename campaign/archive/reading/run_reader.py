@@ -10,9 +10,11 @@ from pathlib import Path
 
 from campaign.archive.layout.files import read_errors, sha256_of
 from campaign.archive.layout.full_plan import FullPlan
-from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
-from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.layout.header import PlannedTrial, RunHeader
+from campaign.archive.layout.journal import TrialsFollowed
 from campaign.archive.layout.journal_summary import Lines
+from campaign.archive.layout.names import JOURNAL
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.lazy_trials import LazyTrials, Outline

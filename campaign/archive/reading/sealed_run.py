@@ -11,17 +11,18 @@ from pathlib import Path
 
 import h5py
 
-from campaign.archive.layout.entries import entry_name, entry_names, file_name
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
-from campaign.archive.layout.header import SEALED, PlannedTrial, RunHeader, RunStatus
+from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal import RunStarted, TrialFinished
 from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.json_lines import line_places
+from campaign.archive.layout.names import RESULTS, SEALED, entry_name, entry_names, file_name
 from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
-from campaign.archive.layout.results import ENDING, ENTRY
+from campaign.archive.layout.results import ENTRY
 from campaign.archive.layout.run_folder import check_format, parse_plan
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.layout.storage import storable
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_metrics import with_metrics
@@ -111,7 +112,7 @@ def check_sealed(path: Path) -> None:
     """Raise ArchiveError if a file is not a sealed run in a format that this program reads."""
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run/provenance/format"):
         if ENTRY in file and "run" not in file:
-            run_path = path.with_name(path.name.removesuffix(ENDING) + SEALED)
+            run_path = path.with_name(path.name.removesuffix(RESULTS) + SEALED)
             hint = f"; name the run, {run_path}" if run_path.is_file() else ""
             raise ArchiveError(f"{path}: holds no run but what was found in one{hint}")
         run = safe_hdf5.member(file, "run")

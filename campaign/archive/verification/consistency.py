@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from campaign.archive.layout.entries import entry_names
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal import RunStarted, TrialFinished, TrialMeasured
 from campaign.archive.layout.journal_summary import Lines
+from campaign.archive.layout.names import entry_names
 from campaign.archive.layout.record import TrialRecord
 from campaign.archive.reading.damage import DamageList
 from campaign.errors import ArchiveError

@@ -12,9 +12,9 @@ from h5py import h5o
 
 from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import entry_name
 from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.journal import TrialFinished
+from campaign.archive.layout.names import entry_name
 from campaign.archive.layout.record import Trees, TrialRecord, series_of
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_samples import TIME, PackedSamples

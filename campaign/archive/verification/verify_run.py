@@ -12,11 +12,9 @@ from pathlib import Path
 import h5py
 
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import PART, sha256_of
-from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.journal_summary import Lines, read_lines
-from campaign.archive.layout.run_folder import HEADER, PLAN
+from campaign.archive.layout.names import ENTRY, HEADER, JOURNAL, PLAN, entry_name, entry_names
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList

@@ -15,8 +15,9 @@ from campaign.archive.layout.files import (
 )
 from campaign.archive.layout.full_plan import write_full_plan
 from campaign.archive.layout.header import FORMAT, PlannedTrial, RunHeader
-from campaign.archive.layout.journal import JOURNAL, Journal, RunStarted
-from campaign.archive.layout.run_folder import HEADER, PLAN, header_document
+from campaign.archive.layout.journal import Journal, RunStarted
+from campaign.archive.layout.names import HEADER, JOURNAL, PLAN
+from campaign.archive.layout.run_folder import header_document
 from campaign.archive.writing.remnants import remove_folder
 from campaign.trial import Trial, canonical_json
 

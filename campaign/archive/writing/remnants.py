@@ -9,12 +9,18 @@ import contextlib
 import os
 from pathlib import Path
 
-from campaign.archive.layout.entries import TRIAL_FILE
 from campaign.archive.layout.files import PART, sync_folder
-from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
-from campaign.archive.layout.header import PARTIAL, SEALED
-from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
+from campaign.archive.layout.names import (
+    HEADER,
+    JOURNAL,
+    PARTIAL,
+    PLAN,
+    PLAN_TREES,
+    PLAN_TRIALS,
+    SEALED,
+    SEALING,
+    TRIAL_FILE,
+)
 
 OWN_FILES = frozenset({HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING})
 """Names of the files in the folder of a run, without those of trials."""

@@ -18,15 +18,8 @@ import h5py
 import numpy as np
 
 from campaign.archive.layout.files import PART, publish, why
-from campaign.archive.layout.results import (
-    ENTRY,
-    FORMAT,
-    HASH,
-    RECORD,
-    ResultsOfTest,
-    RunResults,
-    results_path,
-)
+from campaign.archive.layout.names import results_path
+from campaign.archive.layout.results import ENTRY, FORMAT, HASH, RECORD, ResultsOfTest, RunResults
 from campaign.archive.layout.results_text import to_text
 from campaign.archive.reading.results_file import is_results_file
 from campaign.archive.writing import hdf5

@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from campaign.archive.layout.files import PART, read_errors, sha256_of, why
-from campaign.archive.layout.header import PARTIAL, SEALED, RunStatus
-from campaign.archive.layout.journal import JOURNAL, Journal
+from campaign.archive.layout.journal import Journal
 from campaign.archive.layout.journal_summary import Lines, read_journal
+from campaign.archive.layout.names import JOURNAL, PARTIAL, SEALED
 from campaign.archive.layout.run_folder import read_header
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.layout.signature_file import set_aside_signature
 from campaign.archive.reading.open_run import read_sealed
 from campaign.archive.writing.remnants import clear_beginning, is_own

@@ -11,12 +11,11 @@ import contextlib
 import shutil
 from pathlib import Path
 
-from campaign.archive.layout.entries import entry_name, entry_names
 from campaign.archive.layout.files import publish, why
-from campaign.archive.layout.header import SEALED
-from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal import TrialFinished
 from campaign.archive.layout.journal_summary import read_journal
-from campaign.archive.layout.run_folder import SEALING, read_header
+from campaign.archive.layout.names import JOURNAL, SEALED, SEALING, entry_name, entry_names
+from campaign.archive.layout.run_folder import read_header
 from campaign.archive.writing.remnants import remove_folder
 from campaign.archive.writing.sealed_file import SealedFile, check_sealed
 from campaign.errors import ArchiveError

@@ -15,16 +15,15 @@ from h5py import h5d
 
 from campaign import __version__
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import entry_name
 from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.followup_trials import planned_in, stages_in
-from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
-from campaign.archive.layout.journal import JOURNAL, RunEnded, TrialFinished
+from campaign.archive.layout.journal import RunEnded, TrialFinished
 from campaign.archive.layout.journal_summary import Lines
+from campaign.archive.layout.names import JOURNAL, PLAN, PLAN_TREES, PLAN_TRIALS, entry_name
 from campaign.archive.layout.packed_trial import Place
 from campaign.archive.layout.record import TrialRecord, parse_trees, series_of
-from campaign.archive.layout.run_folder import PLAN, parse_plan, read_text
+from campaign.archive.layout.run_folder import parse_plan, read_text
 from campaign.archive.layout.storage import storable
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_samples import TIME

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive.layout.checksums import series_digest
-from campaign.archive.layout.entries import entry_name, file_name
 from campaign.archive.layout.files import PART, publish, why
 from campaign.archive.layout.journal import TrialFinished
+from campaign.archive.layout.names import entry_name, file_name
 from campaign.archive.layout.packed_trial import PackedSeries, PackedTrial
 from campaign.archive.layout.record import (
     EventRecord,

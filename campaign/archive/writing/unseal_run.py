@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import entry_names, file_name
 from campaign.archive.layout.files import (
     PART,
     keep_umask,
@@ -23,12 +22,20 @@ from campaign.archive.layout.files import (
     write_atomically,
     write_lines_atomically,
 )
-from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
-from campaign.archive.layout.header import PARTIAL
-from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal import TrialFinished
+from campaign.archive.layout.names import (
+    HEADER,
+    JOURNAL,
+    PARTIAL,
+    PLAN,
+    PLAN_TREES,
+    PLAN_TRIALS,
+    entry_names,
+    file_name,
+)
 from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees, trees_text
-from campaign.archive.layout.run_folder import HEADER, PLAN, header_document
+from campaign.archive.layout.run_folder import header_document
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.folder import read_trial_file

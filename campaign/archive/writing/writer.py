@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Self
 
-from campaign.archive.layout.header import PARTIAL, SEALED, RunHeader, RunStatus
+from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.journal import (
     Decision,
     Entry,
@@ -19,6 +19,8 @@ from campaign.archive.layout.journal import (
     TrialMeasured,
     utc_now,
 )
+from campaign.archive.layout.names import PARTIAL, SEALED
+from campaign.archive.layout.run_status import RunStatus
 from campaign.archive.reading.archived_metrics import with_metrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.writing.new_run_folder import make_folder

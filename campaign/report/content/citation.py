@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from campaign.api.analysis import run_title
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.report.latex_text import latex
 
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")

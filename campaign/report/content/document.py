@@ -15,9 +15,10 @@ from campaign.api.analysis import (
     published_of,
     run_title,
 )
-from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.sound_samples import readable
 from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score

@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 
 from campaign.api.analysis import one_line
-from campaign.archive import ArchivedTrial, RunReader
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.sound_samples import Trials, without_damaged
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, MOTOR_CURRENT, POINTING_ERROR, RELATIVE_RATE
 from campaign.errors import ArchiveError

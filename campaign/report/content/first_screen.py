@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from campaign.api.analysis import AnalysedTest
 from campaign.api.estimate_text import remarks, shows_interval
-from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import axis_terms
 from campaign.experiments.shared.captions import listed
 from campaign.published.headline import LIMITS, NOBODY_FITTED, headline

@@ -13,7 +13,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from campaign.api.analysis import AnalysedTest
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import axis_terms, axis_unit
 from campaign.estimate import Estimate
 from campaign.physics.bench import Bench

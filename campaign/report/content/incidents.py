@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from campaign.archive import RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep, RunResumed, TrialsFollowed
 from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.run_reader import RunReader
 from campaign.reason import Cause
 from campaign.report.content.drift import drift_figure, drift_table, drifts_of
 from campaign.report.content.low_margins import low_margin_table

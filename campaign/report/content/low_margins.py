@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from campaign.api.analysis import one_line
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms, sides_in
 from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from campaign.archive import RunHeader
+from campaign.archive.layout.header import RunHeader
 from campaign.protocol.matrix import RANGE_KEYS, flatten
 from campaign.protocol.overrides import parse_overrides
 from campaign.trial import leaves

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.api.analysis import AnalysedTest
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.difference import in_unit

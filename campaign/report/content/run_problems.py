@@ -7,9 +7,11 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
 from campaign.api.analysis import NOT_EXECUTED, AnalysedTest
-from campaign.archive import ArchivedTrial, RunReader, RunStatus
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials
+from campaign.archive.reading.run_reader import RunReader
 from campaign.experiments.shared.common import method
 from campaign.recording import Outcome, SafeState
 from campaign.text import count

@@ -8,11 +8,12 @@ from typing import Any
 
 from campaign.api.analysis import AnalysedTest
 from campaign.api.quantity_words import plain
-from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep
 from campaign.archive.layout.journal_summary import Lines
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import trial_number
+from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.sound_samples import sound_part
 from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
 from campaign.channels import COMMAND

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable
 
-from campaign.archive import RunReader
 from campaign.archive.reading.damage_words import lost_trials
+from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import UsageError
 from campaign.recording import Outcome
 

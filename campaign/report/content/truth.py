@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.api.analysis import AnalysedTest
-from campaign.archive import RunReader
+from campaign.archive.reading.run_reader import RunReader
 from campaign.axis_kind import axis_terms, in_axis_terms
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import student

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any
 
 from campaign.api.analysis import AnalysedTest
-from campaign.archive import RunHeader
+from campaign.archive.layout.header import RunHeader
 from campaign.experiments.shared.common import OF_NO_OPTION
 from campaign.physics.bench import Bench
 from campaign.physics.bench_knowledge import number_at

@@ -11,8 +11,9 @@ from html import unescape
 from pathlib import Path
 from urllib.parse import quote
 
-from campaign.archive import RunSummary, list_runs
-from campaign.archive.layout.header import PARTIAL
+from campaign.archive.layout.names import PARTIAL
+from campaign.archive.reading.run_list import list_runs
+from campaign.archive.reading.summary import RunSummary
 from campaign.errors import UsageError
 from campaign.plain_text import on_a_page
 from campaign.report.index.report_summary import summary_of_report

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import FILE, damaged_csv, heading, in_one_line
+from campaign.archive.reading.run_reader import RunReader
 from campaign.report.page.folder import Download, Folder
 
 TRIALS = 12

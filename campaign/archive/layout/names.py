@@ -1,4 +1,4 @@
-"""Names of the groups and files of trials.
+"""Names of the files and groups of a run.
 
 NeXus allows no hyphen in a name, so the group of trial `trial-00017` is `trial_00017`. In a sealed
 run, this is the group of the last attempt; a replaced attempt has `trial_00017_attempt_1`.
@@ -8,8 +8,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from campaign.archive.layout.journal import TrialFinished
+if TYPE_CHECKING:
+    from campaign.archive.layout.journal import TrialFinished
+
+SEALED = ".nxs"
+"""Suffix of a sealed run."""
+PARTIAL = ".partial"
+"""Suffix of the folder of a run in progress; the files below lie in it."""
+
+RESULTS = f"-results{SEALED}"
+"""Ending of the name of a results file."""
+
+HEADER = "run.json"
+JOURNAL = "journal.jsonl"
+PLAN = "plan.jsonl"
+PLAN_TRIALS = "plan-trials.jsonl"
+PLAN_TREES = "plan-trees.jsonl"
+SEALING = "sealed.nxs.part"
+"""The sealed file while it is written."""
 
 TRIAL = ".trial"
 """Suffix of the file of one trial, while its run is in progress."""
@@ -44,3 +63,9 @@ def entry_names(attempts: Iterable[TrialFinished]) -> dict[str, TrialFinished]:
         else earlier_entry_name(each.trial, each.attempt): each
         for each in known
     }
+
+
+def results_path(run: Path) -> Path:
+    """Path of the results of the run at `run`, a file or a folder."""
+    name = run.name.removesuffix(SEALED).removesuffix(PARTIAL)
+    return run.with_name(f"{name}{RESULTS}")
