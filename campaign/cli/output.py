@@ -283,6 +283,13 @@ def print_table(
         _print_words(out, Text(note, style="dim"))
 
 
+def print_section(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print an empty line and a table; nothing without rows."""
+    if rows:
+        print_line()
+        print_table(headings, rows)
+
+
 def _columns(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[tuple[str, ...]]:
     shown = ([_joined(_plain(cell)) for cell in row] for row in (headings, *rows))
     return zip(*shown, strict=True)

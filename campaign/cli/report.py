@@ -138,13 +138,8 @@ def _command(path: Path, *, measure_anew: bool) -> str:
     """
     from campaign.execution.run_reference import reference
 
-    elsewhere = path.is_absolute()
-    words = ["campaign report", quote(path.stem) if elsewhere else reference(path)]
-    words += [
-        *(["--results FOLDER"] if elsewhere else []),
-        *(["--measure-anew"] if measure_anew else []),
-    ]
-    return " ".join(words)
+    run = f"{quote(path.stem)} --results FOLDER" if path.is_absolute() else reference(path)
+    return f"campaign report {run}{' --measure-anew' if measure_anew else ''}"
 
 
 def _wanted_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
