@@ -174,17 +174,9 @@ def draw_figures(
     wanted: str,
     *,
     measure_anew: bool = False,
-    useless: Sequence[str] = (),
     column: str = "",
 ) -> tuple[tuple[Path, ...], ExitCode]:
-    """Write a figure of a run's report, TEST/KEY, or all; return paths and exit code for damage.
-
-    useless: given options that apply to the whole page only. Raises UsageError for any.
-    """
-    if useless:
-        raise UsageError(
-            f"--only-figure writes a figure and no page; leave {', '.join(useless)} out"
-        )
+    """Write a figure of a run's report, TEST/KEY, or all; return paths and exit code for damage."""
     from campaign.cli.damage import say_damaged
     from campaign.experiments import experiments
     from campaign.report.one_figure import write_figures

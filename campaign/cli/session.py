@@ -58,20 +58,15 @@ from campaign.trial import Trial
 
 @dataclass(frozen=True)
 class Session:
-    """Trials, and the backend that accepts them, not yet connected.
+    """Trials, and the backend that accepts them, not yet connected; the others as in `run_plan`.
 
     Attributes:
-        trials: the whole plan, with the trials of stages from before a resume.
-        finished: trials that are not executed again, by number.
         folder: present or future folder of the run in progress.
-        workers: count of parallel trials.
         checks_step: whether the effect of half the step is reported afterwards.
         repeats: run of a repeated trial; for a replay, the backend states the run itself.
         timing: timing sink.
-        stages: stages that may follow from the trials.
         asked: stages that were evaluated before, from the journal.
         guardian: of a program that moves a bench.
-        executor: executor of the trials; None: threads of this process.
     """
 
     kind: BackendKind
@@ -250,8 +245,17 @@ def _report(outcome: RunOutcome) -> ExitCode:
     Raises:
         Exception: a bug, after a run with exit code DONE.
     """
+    archive: Path = outcome.archive
+    if outcome.exit_code is ExitCode.INTERRUPTED:
+        command = typed("report", reference(archive))
+        print_note(f"no report of an interrupted run; to make one:\n{command}")
+        return ExitCode.DONE
     try:
-        return _build_report(outcome)
+        from campaign.cli.report import report_run
+
+        page, code = report_run(str(archive), archive.parent, None, None)
+        print_note(f"report: {page}")
+        return code
     except CampaignError as error:
         print_warning(f"no report: {error}")
         return error.exit_code
@@ -262,22 +266,9 @@ def _report(outcome: RunOutcome) -> ExitCode:
         if outcome.exit_code is ExitCode.DONE:
             raise
         what = f"{type(error).__name__}: {error}"
-        again = f"campaign report {reference(outcome.archive)} shows it again"
+        again = f"campaign report {reference(archive)} shows it again"
         print_warning(f"no report: internal error: {what}\n{again}")
     return ExitCode.DONE
-
-
-def _build_report(outcome: RunOutcome) -> ExitCode:
-    from campaign.cli.report import report_run
-
-    archive: Path = outcome.archive
-    if outcome.exit_code is ExitCode.INTERRUPTED:
-        name = reference(archive)
-        print_note(f"no report of an interrupted run; to make one:\n{typed('report', name)}")
-        return ExitCode.DONE
-    page, code = report_run(str(archive), archive.parent, None, None)
-    print_note(f"report: {page}")
-    return code
 
 
 @contextmanager

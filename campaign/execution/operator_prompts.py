@@ -45,10 +45,6 @@ class AbsentOperator:
         return self.answer
 
 
-def no_wait(seconds: float, stop: Stop) -> None:
-    """Pause of a bench without thermal effects: none."""
-
-
 def wait_unless(seconds: float, stop: Stop) -> None:
     """Pause in wall-clock time (s) that ends immediately at a stop."""
     end = time.monotonic() + seconds
@@ -68,7 +64,8 @@ class Attendance:
     wait: Callable[[float, Stop], None]
 
 
-UNATTENDED = Attendance(AbsentOperator(), no_wait)
+UNATTENDED = Attendance(AbsentOperator(), lambda seconds, stop: None)
+"""No operator, and no pauses: a simulation has no thermal effects."""
 
 
 class SetUp:

@@ -268,7 +268,7 @@ class SupervisingRecorder:
         ending = replace(ending, reason=storable(ending.reason))
         if self.verdict is None and ending.outcome is Outcome.COMPLETED:
             self._judge_whole()
-        ending = self._with_verdict(ending, forced) if self.verdict is not None else ending
+        ending = self._with_verdict(ending, forced)
         judged = {} if self._ends_trials else self._judged(ending)
         if self._supervision.live and self._samples:
             telemetry |= self._timeliness()

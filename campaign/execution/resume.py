@@ -55,7 +55,7 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
     A trial with a fault is among them only if the policy skipped it. Without that decision it ended
     the run, or its retry is missing.
     """
-    skipped = set(_skipped(run))
+    skipped = _skipped(run)
     return {
         each.trial.number: each.ending.outcome
         for each in run.trials
@@ -64,15 +64,15 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
     }
 
 
-def _skipped(run: RunReader) -> Iterator[int]:
+def _skipped(run: RunReader) -> set[int]:
     """Numbers of the trials that the policy skipped after their last attempt."""
-    skipped: dict[int, bool] = {}
+    skipped: set[int] = set()
     for entry in run.story.entries:
         if isinstance(entry, TrialFinished):
-            skipped[entry.trial] = False
+            skipped.discard(entry.trial)
         elif isinstance(entry, Decision) and entry.trial is not None and entry.decision == "skip":
-            skipped[entry.trial] = True
-    return (trial for trial, skip in skipped.items() if skip)
+            skipped.add(entry.trial)
+    return skipped
 
 
 def differences(was: RunHeader, now: RunHeader) -> list[str]:
