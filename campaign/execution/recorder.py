@@ -167,7 +167,7 @@ class SupervisingRecorder:
     def _hand_over(self, time: Array, block: Array | None) -> None:
         self.heard = self._supervision.clock()
         with self._writing:
-            if self._is_over():
+            if self.verdict is not None or self._closed:
                 self._more = self._more or not self._closed
                 return
             if self._channels is None:
@@ -199,9 +199,6 @@ class SupervisingRecorder:
         event = Event(at if math.isfinite(at) else 0.0, storable(event.text))
         self._events.append(event)
         self._file.event(event)
-
-    def _is_over(self) -> bool:
-        return self.verdict is not None or self._closed
 
     def _judge(self, time: Array, block: Array, *, was_lost: bool) -> int:
         """Check a block; the number of samples to archive: all, or up to the first violation."""
