@@ -30,7 +30,7 @@ from campaign.experiments.interface import (
 )
 from campaign.experiments.responses.figures import coherence_figure, response_figures
 from campaign.experiments.responses.signals import STEADY, usable
-from campaign.experiments.responses.sources import Reading, sources
+from campaign.experiments.responses.sources import ResponseOptions, sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
 from campaign.experiments.shared.common import conditions, joined, of_each_place
 from campaign.experiments.shared.default_options import NO_ROOM, torque_above_friction, usual
@@ -42,7 +42,6 @@ from campaign.trial import Task, TrialRequest
 
 OWN = ("realisation",)
 """Conditions in which the trials of one group differ."""
-READING = Reading("auto", "H1", None, None)
 SWING = 0.7
 """Share of the angle limit that the default options of a rate command may use."""
 FAVARD = 0.5 * math.pi
@@ -150,7 +149,7 @@ def _responses(trials: Sequence[TrialData]) -> Result:
     own, why = usable(trials)
     if not own:
         return Result(notes=(f"{why}.",))
-    responses, remarks = sources(own, bench_of(own[0].trial), READING)
+    responses, remarks = sources(own, bench_of(own[0].trial), ResponseOptions())
     if not responses:
         return Result(notes=tuple(remarks))
     responses.sort(key=lambda each: each.trials)
