@@ -133,9 +133,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 def _analyse(data: TestData) -> Result:
     known = list(data.completed())
     accounts = [(item, metrics(item, _measure)) for item in known]
-    commands = of_each_place(
-        known, OWN, lambda group, suffix: Result(figures=(command_figure(group, suffix),))
-    )
+    commands = of_each_place(known, OWN, lambda group: Result(figures=(command_figure(group),)))
     shaken = [each for each in known if options_of(each.trial).signal != "fourier"]
     results = joined((_responses(shaken), of_each_place(known, OWN, partial(_of_series, data))))
     whole = joined((Result(tuple(reached_tables(accounts))), commands, results))
@@ -172,7 +170,7 @@ def _responses(trials: Sequence[TrialData]) -> Result:
     )
 
 
-def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
+def _of_series(data: TestData, group: Sequence[TrialData]) -> Result:
     """Inverse dynamics of one sweep point, with the terms for which the series is designed."""
     options = options_of(group[0].trial)
     if options.signal != "fourier":
@@ -184,15 +182,8 @@ def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Resul
     except ValueError as error:
         return Result(notes=(f"{group[0].trial.label}: {error}.",))
     findings = tuple(replace(each, conditions=place) for each in inverse.findings)
-    return Result(
-        tuple(replace(each, key=f"{each.key}{suffix}") for each in inverse.tables),
-        (
-            *(replace(each, key=f"{each.key}{suffix}") for each in inverse.figures),
-            plane_figure(group, suffix),
-        ),
-        findings,
-        inverse.notes,
-    )
+    figures = (*inverse.figures, plane_figure(group))
+    return Result(inverse.tables, figures, findings, inverse.notes)
 
 
 EXPERIMENT = Experiment(
