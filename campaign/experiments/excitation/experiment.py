@@ -29,8 +29,8 @@ from campaign.experiments.interface import (
     metrics,
 )
 from campaign.experiments.responses.figures import coherence_figure, response_figures
-from campaign.experiments.responses.signals import STEADY, usable
-from campaign.experiments.responses.sources import ResponseOptions, sources
+from campaign.experiments.responses.signals import STEADY, ResponseOptions, usable
+from campaign.experiments.responses.sources import sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
 from campaign.experiments.shared.common import conditions, joined, of_each_place
 from campaign.experiments.shared.default_options import NO_ROOM, torque_above_friction, usual

@@ -18,7 +18,6 @@ from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Window
 from campaign.estimation.steady_stretches import steady_stretches
 from campaign.experiments.interface import bench_of, validated
-from campaign.experiments.shared.common import number_of
 from campaign.experiments.shared.rig import Rig
 from campaign.options import LaterOptions
 from campaign.physics.bench import Bench
@@ -205,7 +204,7 @@ def settled_angle(trial: Trial) -> float:
 
 def speed_of(trial: Trial) -> float:
     """Commanded speed (rad/s)."""
-    return number_of(trial, "speed")
+    return float(str(trial.point["speed"]))
 
 
 def _replanned(trial: Trial) -> Run:

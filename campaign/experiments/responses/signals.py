@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from campaign.arrays import Array
 from campaign.channels import (
@@ -22,12 +23,14 @@ from campaign.channels import (
 from campaign.estimate import Window
 from campaign.estimation.frequency.multisine import repetition
 from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency.welch import Estimator
 from campaign.estimation.inverse.motion import whole_pieces
 from campaign.experiments.interface import TrialData
+from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Recording, Task, Trial
-from campaign.units import rate_text, torque_text
+from campaign.units import Frequency, Time, rate_text, torque_text
 
 SENSORS: Mapping[Side, tuple[str, ...]] = {
     "load": (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE),
@@ -42,6 +45,21 @@ STEADY = "steady"
 """Window of the samples that are measured: after the transient."""
 
 Excited = Literal["auto", "input", "reference"]
+
+
+class ResponseOptions(Options):
+    """Options of the responses of trials."""
+
+    excited: Excited = "auto"
+    """input: no loop acts on the torque; reference: a loop makes the torque, and the command is the
+    external input of the loop; auto: by the trials' modes."""
+    estimator: Estimator = "H1"
+    """Estimator for torques without a loop: H1 (noise on the rate), H2 (on the torque), Hv (on
+    both)."""
+    resolution: Frequency | None = Field(default=None, gt=0)
+    """Resolution of averaged spectra; absent: a segment is a sixteenth of all samples."""
+    period: Time | None = Field(default=None, gt=0)
+    """Period of a multisine in recordings without its command; absent: that of the command."""
 
 
 def steady_window(trial: Trial) -> Window:

@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from pydantic import Field
 
 from campaign.arrays import Array
 from campaign.axis_kind import axis_unit
@@ -15,14 +14,14 @@ from campaign.estimation.frequency.best_linear import BestLinear, best_linear
 from campaign.estimation.frequency.measured_response import MeasuredResponse, closed_from_open
 from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency.welch import Estimator, Record, welch_response
 from campaign.estimation.frequency.welch import Excited as Excitation
+from campaign.estimation.frequency.welch import Record, welch_response
 from campaign.estimation.frequency_response import Response, make_response
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.interface import TrialData
 from campaign.experiments.responses.signals import (
-    Excited,
+    ResponseOptions,
     Signals,
     base_frequency,
     by_amplitude,
@@ -33,11 +32,10 @@ from campaign.experiments.responses.signals import (
     unused,
     whole_stretches,
 )
-from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Sine
 from campaign.text import pretty_unit
-from campaign.units import Frequency, Time, rate_text, torque_text
+from campaign.units import rate_text, torque_text
 
 FEWEST_SINES = 6
 """Fewest frequencies of a response from single sines."""
@@ -81,21 +79,6 @@ class Source:
     def rms(self) -> float:
         """Rms of the torque of repeated multisines (N m); zero for other kinds."""
         return max((each.excitation.rms for each in self.best.values()), default=0.0)
-
-
-class ResponseOptions(Options):
-    """Options of the responses of trials."""
-
-    excited: Excited = "auto"
-    """input: no loop acts on the torque; reference: a loop makes the torque, and the command is the
-    external input of the loop; auto: by the trials' modes."""
-    estimator: Estimator = "H1"
-    """Estimator for torques without a loop: H1 (noise on the rate), H2 (on the torque), Hv (on
-    both)."""
-    resolution: Frequency | None = Field(default=None, gt=0)
-    """Resolution of averaged spectra; absent: a segment is a sixteenth of all samples."""
-    period: Time | None = Field(default=None, gt=0)
-    """Period of a multisine in recordings without its command; absent: that of the command."""
 
 
 def sources(

@@ -44,8 +44,8 @@ from campaign.experiments.frequency_response.model.validation_figures import (
     validation_tables,
 )
 from campaign.experiments.interface import Model, TestData
-from campaign.experiments.responses.signals import usable
-from campaign.experiments.responses.sources import ResponseOptions, sources
+from campaign.experiments.responses.signals import ResponseOptions, usable
+from campaign.experiments.responses.sources import sources
 from campaign.experiments.responses.tables import distortion_tables, sources_table
 from campaign.experiments.shared.recorded_motion import validation_of
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, known_uncertainty

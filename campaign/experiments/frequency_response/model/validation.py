@@ -20,8 +20,13 @@ from campaign.estimation.frequency.two_mass_model import Side
 from campaign.experiments.frequency_response.model.frequency_fit import Band, FrequencyFit, Masses
 from campaign.experiments.frequency_response.model.tables import drive_name
 from campaign.experiments.interface import TrialData
-from campaign.experiments.responses.signals import Signals, signals, whole_stretches
-from campaign.experiments.responses.sources import ResponseOptions, Source, fitted_part, sources
+from campaign.experiments.responses.signals import (
+    ResponseOptions,
+    Signals,
+    signals,
+    whole_stretches,
+)
+from campaign.experiments.responses.sources import Source, fitted_part, sources
 from campaign.physics.bench import Bench
 from campaign.reason import Reason
 from campaign.signals import MultiSine
