@@ -31,7 +31,7 @@ from campaign.experiments.any_motion.instrument_estimates import (
 )
 from campaign.experiments.any_motion.motions import PLACE_AND_RATE, MotionPiece, never_moved
 from campaign.experiments.interface import no_progress
-from campaign.reason import Cause
+from campaign.reason import Cause, Reason
 
 SQUARED = "_squared"
 """Suffix of the quadratic counterpart of a term over temperature."""
@@ -220,7 +220,11 @@ def in_presliding(one: Estimate, found: Presliding, *, corrected: bool = False) 
             return one
         change = found.values[one.name] - one.value
         return shifted_by(moved_by(one, change) if corrected else one, PRESLIDING, abs(change))
-    reason = HARDLY_SLIDES(percent=100.0 * found.share, reach=found.reach)
+    return opened(one, HARDLY_SLIDES(percent=100.0 * found.share, reach=found.reach))
+
+
+def opened(one: Estimate, reason: Reason) -> Estimate:
+    """The estimate as not determined: its value without an interval."""
     return Estimate.without_interval(
         one.name, one.value, one.unit, reason, method=one.method, origin=Origin.NOT_DETERMINED
     )
@@ -383,9 +387,7 @@ def _without_shares(
     if not shares:
         return dict(estimates)
     return {
-        name: Estimate.without_interval(
-            name, one.value, one.unit, BENDS(), method=one.method, origin=Origin.NOT_DETERMINED
-        )
+        name: opened(one, BENDS())
         if name in shares or name.startswith(("coulomb", "viscous"))
         else one
         for name, one in estimates.items()
