@@ -16,6 +16,8 @@ from traceback import walk_tb
 
 _MODULES = (".py", *EXTENSION_SUFFIXES)
 _GROUP = re.compile(r"^\s*\[\s*campaign\.", re.MULTILINE)
+_OWN = ("campaign", "typer", "click")
+"""Packages with frames in every traceback: this program, and its command line."""
 _VALUE = re.compile(r"=\s*(\S+)")
 
 
@@ -100,10 +102,8 @@ def provider(module: str) -> PlugIn | None:
 def blamed(error: BaseException) -> PlugIn | None:
     """Innermost plug-in in the traceback of `error`; None without one."""
     modules = [frame.f_globals.get("__name__") or "" for frame, _ in walk_tb(error.__traceback__)]
-    candidates = (
-        provider(module) for module in reversed(modules) if not module.startswith("campaign.")
-    )
-    return next(filter(None, candidates), None)
+    foreign = (module for module in reversed(modules) if module.partition(".")[0] not in _OWN)
+    return next(filter(None, map(provider, foreign)), None)
 
 
 def one_line(error: BaseException) -> str:

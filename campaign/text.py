@@ -182,6 +182,12 @@ QUANTITIES = {
 """Displayed names of quantities that differ from their names in files."""
 
 
+def shortened(lines: Sequence[str], most: int, others: str = "more") -> list[str]:
+    """The first `most` lines, then `and N more` if there are others."""
+    rest = len(lines) - most
+    return [*lines[:most], *([f"and {rest} {others}"] if rest > 0 else [])]
+
+
 def quantity_words(quantity: str) -> str:
     """`coulomb_torque` as `Coulomb friction Tc`, `breakaway_torque` as `breakaway torque`."""
     return in_axis_terms(QUANTITIES.get(quantity, quantity.replace("_", " ")))

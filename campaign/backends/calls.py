@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, Generic, TypeVar
@@ -22,6 +22,7 @@ from campaign.backends.interface import (
     StoppedByCommand,
     SupportsExternalStop,
 )
+from campaign.channels import missing
 from campaign.entry_points import blamed, one_line, provider
 from campaign.errors import BackendError, CampaignError
 from campaign.options import Options
@@ -136,10 +137,12 @@ def refusal(backend: Backend, trial: Trial) -> str:
     return storable(_typed(_asked(backend, "refuses", trial) or "", str, backend, "refuses"))
 
 
-def channels(backend: Backend, trial: Trial) -> frozenset[str] | None:
-    """Names of the channels of `trial`; None while unknown."""
-    names = _asked(backend, "channels", trial)
-    return None if names is None else _typed(names, frozenset, backend, "channels")
+def unrecorded(backend: Backend, trial: Trial, names: Collection[str]) -> tuple[str, ...]:
+    """Those of `names` that `backend` is known not to record in `trial`."""
+    recorded = _asked(backend, "channels", trial) if names else None
+    if recorded is None:
+        return ()
+    return missing(names, _typed(recorded, frozenset, backend, "channels"))
 
 
 def execute(backend: Backend, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:

@@ -93,16 +93,11 @@ def report(
         "--interactive": zoom,
         "--reference": references,
     }
-    useless = [name for name, value in of_the_page.items() if value]
-    return draw_figures(
-        run,
-        results,
-        output,
-        only_figure,
-        measure_anew=measure_anew,
-        useless=useless,
-        column=column,
-    )
+    if useless := [name for name, value in of_the_page.items() if value]:
+        raise UsageError(
+            f"--only-figure writes a figure and no page; leave {', '.join(useless)} out"
+        )
+    return draw_figures(run, results, output, only_figure, measure_anew=measure_anew, column=column)
 
 
 @command()

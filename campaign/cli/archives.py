@@ -95,7 +95,9 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
     runs = list_runs(results)
     shown = selection.of(runs)[::-1]
     if as_json:
-        print_json([_tree(run) for run in shown])
+        print_json(
+            [vars(run) | {"path": str(run.path), "duration_s": _seconds(run)} for run in shown]
+        )
     elif not runs:
         print_note(f"{results}: there are no runs; `campaign run` makes one")
     elif not shown:
@@ -134,8 +136,3 @@ def _seconds(run: RunSummary) -> float | None:
     except (ValueError, TypeError):
         return None
     return passed.total_seconds()
-
-
-def _tree(run: RunSummary) -> dict[str, object]:
-    more = {"path": str(run.path), "duration_s": _seconds(run)}
-    return vars(run) | more

@@ -8,14 +8,13 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.backends.interface import BackendKind
 from campaign.cli.output import print_note, print_warning
 from campaign.errors import CampaignError, ExitCode, UsageError
 from campaign.execution.display import Shown
-from campaign.execution.operator_prompts import UNATTENDED, Attendance, wait_unless
+from campaign.execution.operator_prompts import UNATTENDED, AbsentOperator, Attendance, wait_unless
 from campaign.options import Options
 from campaign.plain_text import storable
 from campaign.protocol import PlannedTest
@@ -105,29 +104,10 @@ def attendance_of(kind: BackendKind, display: Shown, *, yes: bool) -> Attendance
     if not (kind.live or kind.by_hand):
         return UNATTENDED
     if yes:
-        return Attendance(AbsentOperator(ASSUMED), wait_unless)
+        return Attendance(AbsentOperator(ASSUMED, print_note), wait_unless)
     if kind.by_hand and not has_terminal():
-        return Attendance(AbsentOperator(ON_ITS_PAGE, shows=False), wait_unless)
+        return Attendance(AbsentOperator(ON_ITS_PAGE), wait_unless)
     return Attendance(ConsoleOperator(display.hidden), wait_unless)
-
-
-@dataclass(frozen=True)
-class AbsentOperator:
-    """No prompts: a script passed `--yes`, or the operator reads the steps on a page.
-
-    Attributes:
-        answer: for the record.
-        shows: whether the steps are printed.
-    """
-
-    answer: str
-    shows: bool = True
-
-    def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
-        """Assume the step is done; return the answer for the record."""
-        if self.shows:
-            print_note(f"before {trial.name}: {step}: {self.answer}")
-        return self.answer
 
 
 class ConsoleOperator:

@@ -20,7 +20,7 @@ from campaign.physics.open_loop import Mode
 from campaign.physics.plan_loops import loops_of
 from campaign.protocol.bench_file import load_bench
 from campaign.protocol.plan_tree import margins_tree
-from campaign.text import number
+from campaign.text import number, shortened
 from campaign.units import convert
 
 TWO_PI = 2.0 * math.pi
@@ -76,14 +76,13 @@ def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode
     else:
         _print(bench, loops, facts)
         print_line(_no_loops(unknown) if unknown else f"Bode picture: {picture}")
-    unstable = [loop for loop in loops if loop.verdict == "UNSTABLE"]
+    unstable = [
+        f"{loop.compensation}, {loop.regime}, under a {loop.mode} command"
+        for loop in loops
+        if loop.verdict == "UNSTABLE"
+    ]
     if unstable:
-        one = unstable[0]
-        print_note(
-            f"unstable: {one.compensation}, {one.regime}, under a {one.mode} command"
-            f"{f', and {len(unstable) - 1} more' if len(unstable) > 1 else ''}",
-            "red",
-        )
+        print_note(f"unstable: {', '.join(shortened(unstable, 1))}", "red")
     return ExitCode.LIMIT_OR_FAULT if unstable else ExitCode.DONE
 
 
@@ -124,7 +123,8 @@ def _write_picture(bench: CompleteBench, path: Path) -> None:
 
 def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> None:
     print_line(f"{bench.name}{f': {bench.description}' if bench.description else ''}")
-    print_line("; ".join(_counted([*loops, *facts])))
+    verdicts = Counter(loop.verdict for loop in loops) + Counter(fact.verdict for fact in facts)
+    print_line("; ".join(f"{count} {verdict}" for verdict, count in verdicts.items()))
     print_line()
     if loops:
         spare = ("slowest decay", "delay margin", "least damped", "crossover")
@@ -139,12 +139,6 @@ def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> N
     if fine := len(facts) - len(shown):
         print_line(f"left out: {fine} values that are fine; with `| cat` all is shown")
     print_line()
-
-
-def _counted(checked: Sequence[CheckedLoop | Fact]) -> Iterator[str]:
-    """Counts of verdicts: `9 fine`, `3 low margin`."""
-    for verdict, count in Counter(each.verdict for each in checked).items():
-        yield f"{count} {verdict}"
 
 
 def _loop_row(loop: CheckedLoop) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from campaign.interrupts import unwinding
 from campaign.references.verdict import Verdict
 from campaign.report.formats import chosen_formats
 from campaign.resources import templates_folder
-from campaign.text import pretty_unit
+from campaign.text import pretty_unit, shortened
 
 STEM = 90
 """Most characters of a run's name in the name of a folder."""
@@ -79,10 +79,8 @@ def _tell(against: Against, comparison: Comparison) -> None:
     print_line(f"{other.letter}  {other.run.name}  {other.title}")
     print_line(" ".join(sentences(against, comparison.tested)))
     benches = list(bench_lines(against))
-    for line in benches[:BENCH_LINES]:
+    for line in shortened(benches, BENCH_LINES, "more of the bench, on the page"):
         print_line(line, 2)
-    if len(benches) > BENCH_LINES:
-        print_line(f"and {len(benches) - BENCH_LINES} more of the bench, on the page")
     if against.equal:
         return
     for why in islice(not_judged(against.pairs), REASONS):

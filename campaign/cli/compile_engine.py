@@ -78,16 +78,12 @@ def warm_up() -> ExitCode:
     from campaign.physics.compilation import distrusted
     from campaign.physics.machine_code import WIDTHS, CompiledPart, folder, is_made
 
-    compiled: list[CompiledPart] = []
-    kept = 0
+    parts: list[CompiledPart] = []
 
     def tell(made: CompiledPart) -> None:
-        nonlocal kept
+        parts.append(made)
         if made.compiled:
-            compiled.append(made)
             print_line(f"{made.seconds:6.1f} s  {made.name}")
-        else:
-            kept += 1
 
     began = time.monotonic()
     if all(map(is_made, WIDTHS)):
@@ -97,10 +93,10 @@ def warm_up() -> ExitCode:
         with Helpers() as helpers:
             make_all(tell, helpers)
     taken = time.monotonic() - began
-    if compiled:
-        print_line(f"compiled {len(compiled)} parts in {taken:.1f} s; {kept} existed")
+    if compiled := sum(part.compiled for part in parts):
+        print_line(f"compiled {compiled} parts in {taken:.1f} s; {len(parts) - compiled} existed")
     else:
-        print_line(f"nothing to compile: all {kept} parts exist, loaded in {taken:.1f} s")
+        print_line(f"nothing to compile: all {len(parts)} parts exist, loaded in {taken:.1f} s")
     where = folder()
     if where is None:
         print_warning(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from campaign.archive.reading.damage import Damage
-from campaign.archive.reading.damage_words import heading, in_words, listed
+from campaign.archive.reading.damage_words import heading, listed
 from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import Backend, ServesArchive
@@ -34,8 +34,5 @@ def archive_of(backend: Backend) -> RunReader | None:
 
 def note_damaged(writer: RunWriter, source: RunReader) -> None:
     """Write the damage of a source run into the journal of a new run."""
-    for damage in source.damaged[:SHOWN]:
-        writer.decision("source damaged", f"{source.name}: {in_words(damage)}")
-    if len(source.damaged) > SHOWN:
-        more = len(source.damaged) - SHOWN
-        writer.decision("source damaged", f"{source.name}: and {more} more")
+    for line in listed(source.damaged, SHOWN):
+        writer.decision("source damaged", f"{source.name}: {line}")

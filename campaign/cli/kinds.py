@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from campaign.backends import backends
 from campaign.channels import UNITS, VOCABULARY, AxisKind
-from campaign.cli.output import on_a_terminal, print_line, print_table, print_warning
+from campaign.cli.output import on_a_terminal, print_line, print_section, print_table, print_warning
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
@@ -104,7 +104,7 @@ def kind_names() -> list[str]:
 
 
 def _show(
-    room: str, name: str, summary: str, options: type[BaseModel] | None, within: str = ""
+    room: str, name: str, summary: str, options: type[BaseModel] | None = None, within: str = ""
 ) -> None:
     print_line(f"{name} ({room}): {summary}")
     if options is not None:
@@ -153,24 +153,19 @@ def _show_needs(experiment: Experiment) -> None:
     required, optional = experiment.requires.items(), experiment.can_use.items()
     rows = [(name, "required", f"for {what}") for name, what in required]
     rows += [(name, "optional", f"without it: no {what}") for name, what in optional]
-    if rows:
-        print_line()
-        print_table(("channel", "", "purpose"), rows)
+    print_section(("channel", "", "purpose"), rows)
     stages = [(f"{n}, {stage.name}", stage.why) for n, stage in enumerate(experiment.stages, FIRST)]
-    if stages:
-        print_line()
-        print_table(("stage", "reason"), stages)
+    print_section(("stage", "reason"), stages)
 
 
 def _show_channels() -> None:
     """Print the vocabulary of channels."""
-    print_line(f"{CHANNELS[1]} ({CHANNELS[0]}): {CHANNELS[2]}")
-    print_line()
+    _show(*CHANNELS)
     rows = []
     for name, what in VOCABULARY.items():
         units = [UNITS[axis][what.quantity][0] or what.quantity.value for axis in AxisKind]
         rows.append((name, *units, what.side.value, what.known_by.value, what.meaning))
-    print_table(("channel", "unit", "linear axis", "side", "known by", "meaning"), rows)
+    print_section(("channel", "unit", "linear axis", "side", "known by", "meaning"), rows)
 
 
 def rooms() -> Iterator[Kinds[Any]]:
@@ -187,10 +182,9 @@ def _whose(room: Kinds[Any], name: str) -> str:
 
 def _show_units() -> None:
     """Print the table of units; docs/protocols.md has the grammar of compound units."""
-    print_line(f"{UNITS_KIND[1]} ({UNITS_KIND[0]}): {UNITS_KIND[2]}")
-    print_line()
+    _show(*UNITS_KIND)
     rows = [(name, " ".join(prefixes), "  ".join(others)) for name, prefixes, others in listed()]
-    print_table(("unit", "prefixes", "or"), rows)
+    print_section(("unit", "prefixes", "or"), rows)
 
 
 def _row(info: OptionInfo) -> tuple[str, str, str, str]:

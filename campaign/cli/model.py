@@ -96,8 +96,9 @@ def show_models(
         print_line(f"{each.model.name}: {each.model.summary}; {accuracy}")
     with writing(path):
         path.write_text(draw(_figure(met, asked)), encoding="utf-8", newline="\n")
-        table = _table(met, asked)
-        table.to_csv(
+        columns = dict(zip(("time_s", "rate_rad_per_s", "angle_rad"), _motion(asked), strict=True))
+        columns |= {f"{each.model.name}_N_m": each.friction for each in met}
+        pd.DataFrame(columns).to_csv(
             path.with_suffix(".csv"), index=False, float_format="%.9g", lineterminator="\n"
         )
     return path
@@ -215,8 +216,3 @@ def _figure(met: Sequence[ModelCycle], motion: MotionOptions) -> Figure:
         ),
         across=2,
     )
-
-
-def _table(met: Sequence[ModelCycle], motion: MotionOptions) -> pd.DataFrame:
-    columns = dict(zip(("time_s", "rate_rad_per_s", "angle_rad"), _motion(motion), strict=True))
-    return pd.DataFrame(columns | {f"{m.model.name}_N_m": m.friction for m in met})

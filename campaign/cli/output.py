@@ -270,10 +270,10 @@ def print_table(
             line = "\t".join(_plain(" ".join(cell.split())) for cell in row)
             (sys.stderr if beside else _ours or sys.stdout).write(f"{line}\n")
         return
-    columns = [[heading, *cells] for heading, *cells in _columns(headings, rows)]
-    fitting = _fitting(out, columns, list(spare))
+    shown = [[_joined(_plain(cell)) for cell in row] for row in (headings, *rows)]
+    fitting = _fitting(out, list(zip(*shown, strict=True)), list(spare))
     if fitting is None:
-        for row in list(zip(*columns, strict=True))[1:]:
+        for row in shown[1:]:
             _print_record(out, headings, row)
         return
     out.print(fitting)
@@ -283,12 +283,14 @@ def print_table(
         _print_words(out, Text(note, style="dim"))
 
 
-def _columns(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[tuple[str, ...]]:
-    shown = ([_joined(_plain(cell)) for cell in row] for row in (headings, *rows))
-    return zip(*shown, strict=True)
+def print_section(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print an empty line and a table; nothing without rows."""
+    if rows:
+        print_line()
+        print_table(headings, rows)
 
 
-def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> Table | None:
+def _fitting(out: Console, columns: list[tuple[str, ...]], spare: list[str]) -> Table | None:
     """Table that fits the terminal; None if that is not possible."""
     unlimited = out.options.update(width=1_000_000)
     while True:

@@ -39,7 +39,7 @@ from campaign.protocol import (
 )
 from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.stages import most_of
-from campaign.text import clock, count
+from campaign.text import clock, count, shortened
 from campaign.trial import Most, Role, Trial
 from campaign.units import Quantity, convert
 
@@ -146,7 +146,7 @@ def print_warnings(plan: Plan) -> None:
         print_warning(line)
 
 
-def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
+def _by_hand(trials: Sequence[Trial]) -> Sequence[str]:
     """Lines on manual steps before trials, at each change within the test."""
     done: tuple[str, ...] = ()
     steps = []
@@ -154,9 +154,7 @@ def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
         if trial.setup != done:
             steps += [f"by hand before {trial.name}: {step}" for step in trial.setup]
         done = trial.setup
-    yield from steps[:NOTES]
-    if len(steps) > NOTES:
-        yield f"and {len(steps) - NOTES} more steps by hand; --json lists all"
+    return shortened(steps, NOTES, "more steps by hand; --json lists all")
 
 
 KEPT = {
@@ -245,11 +243,10 @@ def _print_details(
         print_line(f"  {line}")
     for line in () if cost is None else cost_lines(cost):
         print_line(f"  {line}")
-    notes = Counter(trial.note for trial in trials if trial.note)
-    for note, noted in notes.most_common(NOTES):
-        print_line(f"  {count(noted, 'trial')}: {note}")
-    if len(notes) > NOTES:
-        print_line(f"  and {len(notes) - NOTES} more notes; --json lists all")
+    noted = Counter(trial.note for trial in trials if trial.note).most_common()
+    notes = [f"{count(number, 'trial')}: {note}" for note, number in noted]
+    for line in shortened(notes, NOTES, "more notes; --json lists all"):
+        print_line(f"  {line}")
     print_line()
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from campaign.archive.reading.run_list import find_run
 from campaign.backends import backends, calls
 from campaign.backends.interface import Backend, BackendKind, SimulatesTruth, Source
-from campaign.channels import explained, missing
+from campaign.channels import explained
 from campaign.cli.damage import archive_of
 from campaign.cli.output import print_note
 from campaign.errors import ArchiveError, ProtocolError, UsageError
@@ -177,13 +177,12 @@ def open_backend(
     return backend
 
 
-def check_connected(kind: BackendKind, backend: Backend, trials: Iterable[Trial]) -> None:
+def check_connected(kind: BackendKind, backend: Backend, trials: Sequence[Trial]) -> None:
     """Check a connected backend again, with data from its bench, before anything moves.
 
     Raises UsageError if it refuses one of `trials` or does not record a required channel. Refusals
     are checked for live backends only: for others, a later refusal costs only time.
     """
-    trials = tuple(trials)
     for trial in trials if kind.live else ():
         if why := _refused(kind, backend, trial):
             raise UsageError(f"{why}; nothing was moved")
@@ -203,8 +202,7 @@ def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial])
     """
     messages: dict[tuple[str, tuple[str, ...]], str] = {}  # the first of several equal trials
     for trial in trials:
-        known = calls.channels(backend, trial) if trial.requires else None
-        names = () if known is None else tuple(missing(trial.requires, known))
+        names = calls.unrecorded(backend, trial, trial.requires)
         if names and (trial.test, names) not in messages:
             messages[trial.test, names] = _not_recorded(kind, trial, names)
     if messages:
@@ -239,8 +237,7 @@ def lacking(backend: Backend, trials: Iterable[Trial]) -> dict[str, tuple[str, .
     """Channels by test that its analysis can use but the backend is known not to record."""
     by_test: dict[str, dict[str, None]] = {}
     for trial in trials:
-        known = calls.channels(backend, trial) if trial.can_use else None
-        if known is not None and (names := missing(trial.can_use, known)):
+        if names := calls.unrecorded(backend, trial, trial.can_use):
             by_test.setdefault(trial.test, {}).update(dict.fromkeys(names))
     return {test: tuple(names) for test, names in by_test.items()}
 

@@ -138,13 +138,8 @@ def _command(path: Path, *, measure_anew: bool) -> str:
     """
     from campaign.execution.run_reference import reference
 
-    elsewhere = path.is_absolute()
-    words = ["campaign report", quote(path.stem) if elsewhere else reference(path)]
-    words += [
-        *(["--results FOLDER"] if elsewhere else []),
-        *(["--measure-anew"] if measure_anew else []),
-    ]
-    return " ".join(words)
+    run = f"{quote(path.stem)} --results FOLDER" if path.is_absolute() else reference(path)
+    return f"campaign report {run}{' --measure-anew' if measure_anew else ''}"
 
 
 def _wanted_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
@@ -179,17 +174,9 @@ def draw_figures(
     wanted: str,
     *,
     measure_anew: bool = False,
-    useless: Sequence[str] = (),
     column: str = "",
 ) -> tuple[tuple[Path, ...], ExitCode]:
-    """Write a figure of a run's report, TEST/KEY, or all; return paths and exit code for damage.
-
-    useless: given options that apply to the whole page only. Raises UsageError for any.
-    """
-    if useless:
-        raise UsageError(
-            f"--only-figure writes a figure and no page; leave {', '.join(useless)} out"
-        )
+    """Write a figure of a run's report, TEST/KEY, or all; return paths and exit code for damage."""
     from campaign.cli.damage import say_damaged
     from campaign.experiments import experiments
     from campaign.report.one_figure import write_figures

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.journal import RunResumed, utc_now
 from campaign.archive.layout.names import PARTIAL
 from campaign.archive.layout.signature_file import has_signature
@@ -28,8 +29,6 @@ from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.resume import (
-    Conditions,
-    archived_conditions,
     check_resumable,
     differences,
     followed,
@@ -117,7 +116,7 @@ def resume_run(
             )
         return writer
 
-    with given.opened(backend, left, workers) as (at_once, executor):
+    with given.opened(remade.kind, backend, left, workers) as (at_once, executor):
         session = Session(
             remade.kind,
             backend,
@@ -179,7 +178,7 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
     prepared = prepare(request)
     plan = prepared.plan
     kind, options, truths = prepared.kind, prepared.options, plan.truths
-    changes = _changes(run, plan.normalised, kind, options, plan.trials, truths)
+    changes = _changes(header, plan.normalised, options, plan.trials, truths)
     if not same_list(run.first_stage, plan.trials):
         why = f":\n{listed(changes)}" if changes else ""
         raise UsageError(
@@ -201,23 +200,27 @@ def _from_archive(run: RunReader) -> Remade:
     policy = Policy.model_validate(header.normalised.get("policy", {}), context={"si": True})
     trials = tuple(run.full_plan.trial(planned.number) for planned in run.first_stage)
     truths = header.truth.plants
-    changes = _changes(run, archived_conditions(run).normalised, kind, options, trials, truths)
+    changes = _changes(header, header.normalised, options, trials, truths)
     return Remade(kind, options, trials, (), policy, changes, stages_of(header), truths)
 
 
 def _changes(
-    run: RunReader,
+    header: RunHeader,
     normalised: Tree,
-    kind: BackendKind,
     options: Options,
     trials: Sequence[Trial],
     truths: Mapping[str, Tree],
 ) -> tuple[str, ...]:
     """Differences of the present conditions from those at the start of the run."""
-    plug_ins = provenance.plug_ins(trials, kind.name, truths.values())
-    settings = options.model_dump(mode="json")
-    now = Conditions(normalised, kind.name, settings, provenance.versions(), plug_ins)
-    return tuple(differences(archived_conditions(run), now))
+    now = header.model_copy(
+        update={
+            "normalised": normalised,
+            "backend_options": options.model_dump(mode="json"),
+            "versions": provenance.versions(),
+            "plugins": provenance.plug_ins(trials, header.backend, truths.values()),
+        }
+    )
+    return tuple(differences(header, now))
 
 
 def _check_truth(run: RunReader, trials: Sequence[Trial]) -> None:

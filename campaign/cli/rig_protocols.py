@@ -19,7 +19,7 @@ from campaign.interrupts import unwinding
 from campaign.physics.bench import Bench
 from campaign.physics.complete import lacking
 from campaign.protocol import Plan, check_limits, check_loops, load_protocol, make_plan
-from campaign.protocol.bench_file import load_bench
+from campaign.protocol.bench_file import bench_source, load_bench
 from campaign.resources import protocols_folder
 from campaign.text import clock
 
@@ -35,8 +35,7 @@ def init_for_bench(folder: Path, written: str) -> None:
     Raises, before writing, ProtocolError for an invalid bench, and UsageError if a file exists.
     Raises UsageError also if a file cannot be written.
     """
-    bench = load_bench(written)
-    source = _source(written)
+    bench, source = load_bench(written), bench_source(written).file
     own = folder / "benches" / source.name
     # Without compensations, e.g. a motor on a table, there is nothing to stabilize.
     names = ("identify", *(["stabilize"] if bench.compensation else []))
@@ -46,7 +45,7 @@ def init_for_bench(folder: Path, written: str) -> None:
     for text in files.values():
         for test in tomllib.loads(text)["test"]:
             _check_fit(test["name"], experiments()[test["kind"]], bench)
-    if not _is(source, own):
+    if not (own.exists() and own.samefile(source)):
         files[own] = source.read_text(encoding="utf-8")
     taken = [path for path in files if path.exists()]
     if taken:
@@ -72,16 +71,6 @@ def _check_fit(name: str, experiment: Experiment, bench: Bench) -> None:
                 experiment.fit(experiment.options(), bench)
     except (ValueError, ArithmeticError) as error:
         raise UsageError(f"{bench.name}: no {name} test suits it: {error}") from None
-
-
-def _source(written: str) -> Path:
-    """File of a bench from its name or path, as typed."""
-    shipped = protocols_folder() / "benches" / f"{written}.toml"
-    return shipped if shipped.is_file() else Path(written)
-
-
-def _is(one: Path, other: Path) -> bool:
-    return other.exists() and one.resolve() == other.resolve()
 
 
 def _text(name: str, bench: Bench, file: str) -> str:

@@ -75,7 +75,7 @@ def run_protocol(
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=given.yes)
     began = datetime.now(UTC)
     with (
-        given.opened(backend, plan.trials, workers) as (at_once, executor),
+        given.opened(prepared.kind, backend, plan.trials, workers) as (at_once, executor),
         reserved_name(results, prepared.path.stem, began) as lock,
     ):
 

@@ -7,30 +7,27 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from campaign.backends.interface import Backend, BackendKind
 from campaign.cli.output import print_note, print_warning
 from campaign.errors import UsageError
-from campaign.execution.executors import FEWEST_FOR_PROCESSES, PRELOADED, OpenExecutor
+from campaign.execution.executors import (
+    FEWEST_FOR_PROCESSES,
+    PRELOADED,
+    OpenExecutor,
+    process_executor,
+)
 from campaign.processes import start_preloading
 from campaign.trial import Trial
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of `run` and `resume`, as typed.
+    """Options of `run` and `resume`, as typed; `parameters.py` describes each.
 
-    Attributes:
-        workers: count of parallel trials; None: as backend and machine permit.
-        executor: empty for this machine's own threads and processes.
-        tls: folder with the certificates of a cluster.
-        report: whether the report is built at the end.
-        yes: whether prompts are suppressed.
-        clear_stop: count of a panic stop that the operator has seen.
-        sign: key to sign the run with; tested before anything moves.
-        watch: whether channels of the running trial are drawn; trials are then executed in this
-            process.
+    With `watch`, trials are executed in this process.
     """
 
     workers: int | None = None
@@ -67,11 +64,14 @@ class RunOptions:
 
     @contextmanager
     def opened(
-        self, backend: Backend, trials: Sequence[Trial], workers: int | None
+        self, kind: BackendKind, backend: Backend, trials: Sequence[Trial], workers: int | None
     ) -> Iterator[tuple[int, OpenExecutor | None]]:
-        """Count of parallel trials, and their executor; None for this machine."""
+        """Count of parallel trials, and their executor; None for threads of this process."""
         if not self.executor:
-            yield workers or 1, None
+            count, executor = workers or 1, None
+            if in_processes(kind, count, len(trials)) and not self.watch:
+                executor = partial(process_executor, count=count)
+            yield count, executor
             return
         from campaign.execution.dask_executor import cluster
 

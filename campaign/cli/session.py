@@ -24,14 +24,14 @@ from campaign.cli.damage import archive_of, note_damaged, say_damaged
 from campaign.cli.latch import clear_stop
 from campaign.cli.output import error_console, print_line, print_note, print_warning
 from campaign.cli.prepare import check_connected
-from campaign.cli.run_options import DEFAULTS, RunOptions, in_processes
+from campaign.cli.run_options import DEFAULTS, RunOptions
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, worst_exit_code
 from campaign.execution.display import Shown, progress_display
-from campaign.execution.executors import OpenExecutor, process_executor
+from campaign.execution.executors import OpenExecutor
 from campaign.execution.outcome import RunOutcome
-from campaign.execution.run_reference import how_to_go_on, reference, typed
+from campaign.execution.run_reference import finished_trials, reference, typed
 from campaign.execution.runner import run_plan
 from campaign.execution.safety import (
     NOT_SAFE,
@@ -58,20 +58,15 @@ from campaign.trial import Trial
 
 @dataclass(frozen=True)
 class Session:
-    """Trials, and the backend that accepts them, not yet connected.
+    """Trials, and the backend that accepts them, not yet connected; the others as in `run_plan`.
 
     Attributes:
-        trials: the whole plan, with the trials of stages from before a resume.
-        finished: trials that are not executed again, by number.
         folder: present or future folder of the run in progress.
-        workers: count of parallel trials.
         checks_step: whether the effect of half the step is reported afterwards.
         repeats: run of a repeated trial; for a replay, the backend states the run itself.
         timing: timing sink.
-        stages: stages that may follow from the trials.
         asked: stages that were evaluated before, from the journal.
         guardian: of a program that moves a bench.
-        executor: executor of the trials; None: threads or processes of this machine.
     """
 
     kind: BackendKind
@@ -94,11 +89,6 @@ class Session:
     def source(self) -> RunReader | None:
         """Archived run that is the source of this one, if any."""
         return self.repeats or archive_of(self.backend)
-
-    @property
-    def left(self) -> Iterator[Trial]:
-        """Trials to execute."""
-        return (trial for trial in self.trials if trial.number not in self.finished)
 
 
 def conduct(session: Session, open_archive: Callable[[], RunWriter]) -> ExitCode:
@@ -156,7 +146,8 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
             with connected(session.backend, print_warning) as backend:
                 os.chdir(here)
                 with safe_when_broken_off(backend):
-                    check_connected(session.kind, backend, session.left)
+                    left = [t for t in session.trials if t.number not in session.finished]
+                    check_connected(session.kind, backend, left)
                     cleared = clear_stop(backend, session.given.clear_stop, stop)
                     writer = open_archive()
                     writer.timing = session.timing
@@ -182,7 +173,7 @@ def _what_is_kept(folder: Path) -> str:
         return f"stopped at once; the run is in {sealed}"
     if not folder.exists():
         return NOTHING_BEGUN
-    return f"stopped at once; the finished trials are in {folder}; {how_to_go_on(folder)}"
+    return f"stopped at once; {finished_trials(folder)}"
 
 
 @contextmanager
@@ -195,16 +186,12 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
     except Exception:
         existing = (path for path in (folder, folder.with_suffix(SEALED)) if path.exists())
         if kept := next(existing, None):
-            print_warning(f"the finished trials are in {kept}; {how_to_go_on(kept)}")
+            print_warning(finished_trials(kept))
         raise
 
 
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
     measuring = TrialMeasurement(experiments(), session.timing)
-    executor, left = session.executor, sum(1 for _ in session.left)
-    here = executor is None and not session.given.watch
-    if here and in_processes(session.kind, session.workers, left):
-        executor = partial(process_executor, count=session.workers)
     supervision = Supervision(session.kind.source, session.kind.live, timing=session.timing)
     showing = watching if session.given.watch else progress_display
     with showing(error_console()) as display:
@@ -222,7 +209,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             supervision=supervision,
             measure=measuring,
             finished=session.finished,
-            executor=executor,
+            executor=session.executor,
             stages=Stages(
                 session.stages,
                 session.trials,
@@ -258,8 +245,17 @@ def _report(outcome: RunOutcome) -> ExitCode:
     Raises:
         Exception: a bug, after a run with exit code DONE.
     """
+    archive: Path = outcome.archive
+    if outcome.exit_code is ExitCode.INTERRUPTED:
+        command = typed("report", reference(archive))
+        print_note(f"no report of an interrupted run; to make one:\n{command}")
+        return ExitCode.DONE
     try:
-        return _build_report(outcome)
+        from campaign.cli.report import report_run
+
+        page, code = report_run(str(archive), archive.parent, None, None)
+        print_note(f"report: {page}")
+        return code
     except CampaignError as error:
         print_warning(f"no report: {error}")
         return error.exit_code
@@ -270,22 +266,9 @@ def _report(outcome: RunOutcome) -> ExitCode:
         if outcome.exit_code is ExitCode.DONE:
             raise
         what = f"{type(error).__name__}: {error}"
-        again = f"campaign report {reference(outcome.archive)} shows it again"
+        again = f"campaign report {reference(archive)} shows it again"
         print_warning(f"no report: internal error: {what}\n{again}")
     return ExitCode.DONE
-
-
-def _build_report(outcome: RunOutcome) -> ExitCode:
-    from campaign.cli.report import report_run
-
-    archive: Path = outcome.archive
-    if outcome.exit_code is ExitCode.INTERRUPTED:
-        name = reference(archive)
-        print_note(f"no report of an interrupted run; to make one:\n{typed('report', name)}")
-        return ExitCode.DONE
-    page, code = report_run(str(archive), archive.parent, None, None)
-    print_note(f"report: {page}")
-    return code
 
 
 @contextmanager

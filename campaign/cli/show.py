@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -20,14 +20,12 @@ from campaign.archive.layout.journal import (
 from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.layout.record import plain
 from campaign.archive.layout.signature_file import has_signature, signature_path
-from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.open_run import open_run
 from campaign.archive.reading.run_list import find_run
 from campaign.archive.reading.run_reader import RunReader
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import on_a_terminal, print_json, print_line, print_table
+from campaign.cli.output import on_a_terminal, print_json, print_line, print_section, print_table
 from campaign.errors import ExitCode
-from campaign.estimate import Estimate
 from campaign.recording import Outcome
 from campaign.text import interval, pretty_unit
 from campaign.trial import Tree
@@ -68,35 +66,38 @@ def _print(run: RunReader, story: Lines) -> None:
         print_line(f"no trial executed: {', '.join(idle)}")
     failed = [each for each in run.outlines if each.outcome is not Outcome.COMPLETED]
     rows = [(_name(t.number), t.label, t.outcome.value, t.reason) for t in failed]
-    _section(("trial", "what", "outcome", "reason"), rows)
-    _section(("trial", "attempt", "outcome", "reason"), [_attempt(a) for a in _repeated(story)])
-    _section(("when", "trial", "decision", "reason"), [_decision(d) for d in story.all(Decision)])
-    _section(("trial", "operator step", "answer"), [_step(s) for s in story.all(OperatorStep)])
-    _section(("stage", "trials", "refused"), [_stage(stage) for stage in run.stages])
-    _section(("resumed", "changes"), [(r.at, "; ".join(r.changes)) for r in story.all(RunResumed)])
-    _section(("damaged", "why"), [_damage(damage) for damage in run.damaged])
+    print_section(("trial", "what", "outcome", "reason"), rows)
+    rows = [(_name(a.trial), str(a.attempt), a.outcome.value, a.reason) for a in _repeated(story)]
+    print_section(("trial", "attempt", "outcome", "reason"), rows)
+    rows = [(d.at, _name(d.trial), d.decision, d.reason) for d in story.all(Decision)]
+    print_section(("when", "trial", "decision", "reason"), rows)
+    steps = [(_name(s.trial), s.step, s.answer) for s in story.all(OperatorStep)]
+    print_section(("trial", "operator step", "answer"), steps)
+    print_section(("stage", "trials", "refused"), [_stage(stage) for stage in run.stages])
+    print_section(
+        ("resumed", "changes"), [(r.at, "; ".join(r.changes)) for r in story.all(RunResumed)]
+    )
+    print_section(
+        ("damaged", "why"), [(each.place or "the file", each.reason) for each in run.damaged]
+    )
 
 
 def _print_metrics(run: RunReader) -> None:
     rows = [
-        (trial.trial.name, trial.trial.label, *_metric(estimate))
+        (
+            trial.trial.name,
+            trial.trial.label,
+            each.name,
+            interval(each.value, *each.combined),
+            pretty_unit(each.unit),
+            str(each.reason),
+        )
         for trial in run.trials
-        for estimate in trial.estimates
+        for each in trial.estimates
     ]
-    _section(("trial", "what", "quantity", "value (95 %)", "unit", "reason"), rows)
+    print_section(("trial", "what", "quantity", "value (95 %)", "unit", "reason"), rows)
     if not rows:
         print_line("this run has no archived metrics")
-
-
-def _metric(found: Estimate) -> tuple[str, ...]:
-    value = interval(found.value, *found.combined)
-    return found.name, value, pretty_unit(found.unit), str(found.reason)
-
-
-def _section(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    if rows:
-        print_line()
-        print_table(headings, rows)
 
 
 def _name(trial: int | None) -> str:
@@ -110,27 +111,11 @@ def _repeated(story: Lines) -> list[TrialFinished]:
     return sorted(several, key=lambda attempt: (attempt.trial, attempt.attempt))
 
 
-def _attempt(attempt: TrialFinished) -> tuple[str, ...]:
-    return (_name(attempt.trial), str(attempt.attempt), attempt.outcome.value, attempt.reason)
-
-
-def _decision(decision: Decision) -> tuple[str, ...]:
-    return (decision.at, _name(decision.trial), decision.decision, decision.reason)
-
-
-def _step(step: OperatorStep) -> tuple[str, ...]:
-    return (_name(step.trial), step.step, step.answer)
-
-
 def _stage(stage: TrialsFollowed) -> tuple[str, ...]:
     numbers = [trial.number for trial in stage.trials]
     trials = f"{_name(numbers[0])} to {_name(numbers[-1])}" if numbers else "none"
     refused = "; ".join(f"{each.label}: {each.why}" for each in stage.refused)
     return (stage.title, trials, stage.reason or refused)
-
-
-def _damage(damage: Damage) -> tuple[str, ...]:
-    return (damage.place or "the file", damage.reason)
 
 
 def _tree(run: RunReader, story: Lines) -> dict[str, object]:
@@ -209,10 +194,10 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
 
 def _truth(truth: Truth) -> str:
     """Text on the truths that were simulated in place of the stated benches."""
+    if not truth.plants:
+        return ""
     names = ", ".join(dict.fromkeys(str(plant.get("name")) for plant in truth.plants.values()))
-    return f"{names} ({', '.join(truth.sources)}), simulated in place of the stated bench" * bool(
-        names
-    )
+    return f"{names} ({', '.join(truth.sources)}), simulated in place of the stated bench"
 
 
 def _signature(run: RunReader) -> str:

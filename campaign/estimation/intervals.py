@@ -213,6 +213,12 @@ def multiplied(estimate: Estimate, factor: float) -> Estimate:
     )
 
 
+def moved_by(estimate: Estimate, change: float) -> Estimate:
+    """Estimate plus a known change, with its interval; its unit stays."""
+    low, high = (None if end is None else end + change for end in (estimate.low, estimate.high))
+    return replace(estimate, value=estimate.value + change, low=low, high=high)
+
+
 def welch(*parts: tuple[float, float | None]) -> float:
     """Degrees of freedom of a sum of independent errors, each (standard error, freedom).
 

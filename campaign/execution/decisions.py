@@ -62,13 +62,8 @@ class Rests:
 
     @property
     def left(self) -> float:
-        """Bench time (s) until the next rest; infinite without rests."""
+        """Bench time (s) until the next rest, which is due at 0; infinite without rests."""
         return math.inf if self._rest is None else self._rest.every - self._since
-
-    @property
-    def due(self) -> Rest | None:
-        """The rest that is due before the next trial, or None."""
-        return self._rest if self._rest is not None and self._since >= self._rest.every else None
 
     def taken(self) -> None:
         """Reset the count after a rest."""

@@ -15,9 +15,7 @@ from rich.text import Text
 
 from campaign.execution.progress import Progress
 from campaign.plain_text import printable
-from campaign.recording import Ending
 from campaign.text import clock
-from campaign.trial import Trial
 
 PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
 PATIENCE = 2.0  # s that the archive may take to close before a message is shown
@@ -159,8 +157,12 @@ class PlainDisplay:
 
 def news(progress: Progress) -> Iterator[Text]:
     """Lines that stay: a failed trial, a decision of the run."""
-    if (failure := _failure(progress.ended)) is not None:
-        yield failure
+    # The end of the run reports interrupted trials and the source of the stop once.
+    if progress.ended is not None and progress.ended[1].outcome.failed:
+        trial, ending = progress.ended
+        reason = f": {ending.reason}" if ending.reason else ""
+        line = f"{trial.name} {trial.label} {ending.outcome.value}{reason}"
+        yield Text(printable(line), style="yellow")
     if progress.remark:
         yield Text(printable(progress.remark), style="yellow")
 
@@ -189,13 +191,3 @@ def time_left(progress: Progress) -> str:
 def standing(progress: Progress) -> str:
     """Counts and remaining time, in one line."""
     return ", ".join(filter(None, (counts(progress), time_left(progress))))
-
-
-def _failure(ended: tuple[Trial, Ending] | None) -> Text | None:
-    # The end of the run reports interrupted trials and the source of the stop once.
-    if ended is None or not ended[1].outcome.failed:
-        return None
-    trial, ending = ended
-    reason = f": {ending.reason}" if ending.reason else ""
-    line = f"{trial.name} {trial.label} {ending.outcome.value}{reason}"
-    return Text(printable(line), style="yellow")

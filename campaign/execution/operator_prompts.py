@@ -27,16 +27,22 @@ class Operator(Protocol):
         """
 
 
-class SimulatedOperator:
-    """Confirms every step immediately; for benches without an operator."""
+@dataclass(frozen=True)
+class AbsentOperator:
+    """Confirms every step immediately, without a prompt.
+
+    Attributes:
+        answer: for the record.
+        say: called with a line on each step.
+    """
+
+    answer: str = "simulated"
+    say: Callable[[str], None] = lambda line: None
 
     def confirm(self, trial: Trial, step: str, stop: Stop) -> str | None:
-        """Answer without a prompt."""
-        return "simulated"
-
-
-def no_wait(seconds: float, stop: Stop) -> None:
-    """Pause of a bench without thermal effects: none."""
+        """Assume that the step is done."""
+        self.say(f"before {trial.name}: {step}: {self.answer}")
+        return self.answer
 
 
 def wait_unless(seconds: float, stop: Stop) -> None:
@@ -58,7 +64,8 @@ class Attendance:
     wait: Callable[[float, Stop], None]
 
 
-UNATTENDED = Attendance(SimulatedOperator(), no_wait)
+UNATTENDED = Attendance(AbsentOperator(), lambda seconds, stop: None)
+"""No operator, and no pauses: a simulation has no thermal effects."""
 
 
 class SetUp:

@@ -74,7 +74,7 @@ class Ledger:
         self._running: dict[int, Trial] = {}
         self._reached: dict[int, float] = {}
         self._last_report = 0.0
-        self._outcomes: dict[Outcome, int] = dict(Counter(finished.values()))
+        self._outcomes = Counter(finished.values())
 
     @property
     def outcomes(self) -> dict[Outcome, int]:
@@ -84,7 +84,7 @@ class Ledger:
     @property
     def left(self) -> int:
         """Trials that have not ended."""
-        return self._total - sum(self._outcomes.values())
+        return self._total - self._outcomes.total()
 
     def add(self, trials: Sequence[Trial]) -> None:
         """Add the trials of a stage."""
@@ -96,7 +96,7 @@ class Ledger:
         for trial in trials:
             self._running[trial.number] = trial
             self._reached[trial.number] = 0.0
-        self._report(None)
+        self._report()
 
     def reached(
         self, trial: Trial, channels: tuple[ChannelInfo, ...], time: Array, block: Array
@@ -108,16 +108,14 @@ class Ledger:
     def look(self) -> None:
         """Update the display if the running trials have progressed."""
         if self._running and self._of_running() > self._last_report:
-            self._report(None)
+            self._report()
 
     def end(self, trial: Trial, ending: Ending) -> None:
         """Count a trial that has ended and is archived."""
-        self._running.pop(trial.number, None)
-        self._reached.pop(trial.number, None)
-        self._outcomes[ending.outcome] = self._outcomes.get(ending.outcome, 0) + 1
+        self._outcomes[ending.outcome] += 1
         self._worth_done += self._worth(trial)
         self._worth_left -= self._worth(trial)
-        self._report((trial, ending))
+        self.attempt_ended(trial, ending)
 
     def take_back(self, trial: Trial) -> None:
         """Uncount a completed trial that is executed again."""
@@ -125,22 +123,22 @@ class Ledger:
         self._worth_done -= self._worth(trial)
         self._worth_left += self._worth(trial)
 
-    def repeat(self, trial: Trial, ending: Ending) -> None:
-        """Note the end of an attempt; the trial will be executed again."""
+    def attempt_ended(self, trial: Trial, ending: Ending) -> None:
+        """Note the end of an attempt, the last one or not."""
         self._running.pop(trial.number, None)
         self._reached.pop(trial.number, None)
         self._report((trial, ending))
 
     def remark(self, text: str) -> None:
         """Display a decision of the run."""
-        self._report(None, remark=text)
+        self._report(remark=text)
 
     def close(self) -> None:
         """Display that the archive is being closed, after all trials."""
-        self._report(None, closing=True)
+        self._report(closing=True)
 
     def _report(
-        self, ended: tuple[Trial, Ending] | None, remark: str = "", *, closing: bool = False
+        self, ended: tuple[Trial, Ending] | None = None, remark: str = "", *, closing: bool = False
     ) -> None:
         self._last_report = self._of_running()
         shares = {
@@ -151,9 +149,9 @@ class Ledger:
         self._display(
             Progress(
                 total=self._total,
-                done=self._outcomes.get(Outcome.COMPLETED, 0),
+                done=self._outcomes[Outcome.COMPLETED],
                 failed=sum(n for outcome, n in self._outcomes.items() if outcome.failed),
-                interrupted=self._outcomes.get(Outcome.INTERRUPTED, 0),
+                interrupted=self._outcomes[Outcome.INTERRUPTED],
                 running=tuple(self._running[number] for number in sorted(self._running)),
                 ended=ended,
                 remark=remark,

@@ -88,12 +88,12 @@ class SupervisingRecorder:
             if self._closed:
                 return
             if self._channels is not None:
-                self._refuse("channels", "the channels were announced a second time")
+                self._give(self._new("channels", "the channels were announced a second time"))
                 return
             try:
                 self._announced = announced(self._trial, tuple(channels))
             except (ValueError, TypeError) as error:
-                self._refuse("channels", str(error))
+                self._give(self._new("channels", str(error)))
                 return
             self._channels = self._announced.channels
             names = [info.name for info in self._channels]
@@ -101,13 +101,12 @@ class SupervisingRecorder:
             self._file.start(self._channels)
             for text in self._announced.converted:
                 self._file.event(Event(0.0, text))
-            lacking = missing(self._trial.requires, names)
-            if lacking:
-                self._find(
-                    "channels",
+            if lacking := missing(self._trial.requires, names):
+                reason = (
                     f"{', '.join(lacking)}: not recorded, but {self._trial.kind} needs it; "
-                    f"announced are {', '.join(names)}",
+                    f"announced are {', '.join(names)}"
                 )
+                self._find(self._new("channels", reason))
 
     def append(self, time: Array, block: Array) -> None:
         # None means lost samples here.
@@ -168,16 +167,17 @@ class SupervisingRecorder:
     def _hand_over(self, time: Array, block: Array | None) -> None:
         self.heard = self._supervision.clock()
         with self._writing:
-            if self._is_over():
+            if self.verdict is not None or self._closed:
                 self._more = self._more or not self._closed
                 return
             if self._channels is None:
-                self._refuse("channels", "samples came before the channels were announced")
+                reason = "samples came before the channels were announced"
+                self._give(self._new("channels", reason))
                 return
             try:
                 time, samples = shaped(time, block, len(self._channels))
             except ValueError as error:
-                self._refuse("shape", str(error))
+                self._give(self._new("shape", str(error)))
                 return
             if not len(time):
                 return
@@ -199,9 +199,6 @@ class SupervisingRecorder:
         event = Event(at if math.isfinite(at) else 0.0, storable(event.text))
         self._events.append(event)
         self._file.event(event)
-
-    def _is_over(self) -> bool:
-        return self.verdict is not None or self._closed
 
     def _judge(self, time: Array, block: Array, *, was_lost: bool) -> int:
         """Check a block; the number of samples to archive: all, or up to the first violation."""
@@ -227,7 +224,7 @@ class SupervisingRecorder:
             return len(time)
         if not self._ends_trials:
             for _, verdict in problems:
-                self._say(verdict)
+                self._find(verdict)
             return len(time)
         index, verdict = min(problems, key=lambda each: each[0])
         self._give(verdict)
@@ -235,31 +232,24 @@ class SupervisingRecorder:
 
     # Verdicts
 
-    def _new(self, kind: str, reason: str, fault: Fault) -> Verdict:
+    def _new(self, kind: str, reason: str, fault: Fault = Fault.RECORDING) -> Verdict:
         """Verdict at the present end of the recording."""
         at = self._samples / self._trial.task.sample_rate
         return Verdict(kind, Outcome.FAULT, reason, at, fault)
 
-    def _find(self, kind: str, reason: str) -> None:
+    def _find(self, verdict: Verdict) -> None:
         """End the trial, or report on a recording: it violates a condition of the trial."""
-        verdict = self._new(kind, reason, Fault.RECORDING)
         if self._ends_trials:
             self._give(verdict)
         else:
-            self._say(verdict)
-
-    def _refuse(self, kind: str, reason: str) -> None:
-        """End the trial or recording: its data cannot be archived."""
-        self._give(self._new(kind, reason, Fault.RECORDING))
+            self._said.setdefault(verdict.kind, verdict)
 
     def _give(self, verdict: Verdict) -> None:
+        """End the trial, or a recording whose data cannot be archived."""
         with self._judging:
             if self.verdict is None and not self._closed:
                 self.verdict = verdict
         self._stop.trip()
-
-    def _say(self, verdict: Verdict) -> None:
-        self._said.setdefault(verdict.kind, verdict)
 
     def _publish(self, time: Array, block: Array) -> None:
         for subscriber in tuple(self._subscribers):
@@ -272,21 +262,18 @@ class SupervisingRecorder:
 
     def _concluded(self, ending: Ending, forced: bool) -> Ending:
         telemetry = storable_tree(dict(ending.telemetry))
-        ending = replace(ending, reason=storable(ending.reason), telemetry=telemetry)
+        ending = replace(ending, reason=storable(ending.reason))
         if self.verdict is None and ending.outcome is Outcome.COMPLETED:
             self._judge_whole()
-        ending = self._with_verdict(ending, forced) if self.verdict is not None else ending
+        ending = self._with_verdict(ending, forced)
         judged = {} if self._ends_trials else self._judged(ending)
-        telemetry = {}
         if self._supervision.live and self._samples:
             telemetry |= self._timeliness()
         if self.unwatched and self._samples:
             telemetry["unwatched_limits"] = list(self.unwatched)
         if judged:
             telemetry["judged"] = judged
-        if telemetry:
-            ending = replace(ending, telemetry={**ending.telemetry, **telemetry})
-        return ending
+        return replace(ending, telemetry=telemetry)
 
     def _judge_whole(self) -> None:
         """Check a trial that the backend reports as completed."""
@@ -295,14 +282,14 @@ class SupervisingRecorder:
             reason = f"{self._lost} samples were lost and are marked"
             self._give(self._new("lost", reason, Fault.LOST_SAMPLES))
         elif self._channels is None:
-            self._find("channels", "completed, but nothing was recorded")
+            self._find(self._new("channels", "completed, but nothing was recorded"))
         elif task.stop_rate is None and not self.is_complete:
             wanted = task.duration * task.sample_rate
-            self._find(
-                "length",
+            reason = (
                 f"completed, but with {self._samples} samples instead of {wanted:.0f}: nothing "
-                f"after {self._samples / task.sample_rate:.6g} s of {task.duration:.6g} s",
+                f"after {self._samples / task.sample_rate:.6g} s of {task.duration:.6g} s"
             )
+            self._find(self._new("length", reason))
 
     def _with_verdict(self, ending: Ending, forced: bool) -> Ending:
         """Apply the verdict, unless the backend ended the trial by itself at that sample."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from campaign.archive.layout.header import PlannedTrial, RunHeader
@@ -16,6 +15,7 @@ from campaign.execution.provenance import shaping
 from campaign.protocol import PlannedStage
 from campaign.protocol.plan_tree import planned_stage
 from campaign.recording import Outcome
+from campaign.text import shortened
 from campaign.trial import Tree, Trial, canonical_json
 
 SHOWN = 20
@@ -24,23 +24,6 @@ SHOWN = 20
 _SETTLED = (Outcome.COMPLETED, Outcome.LIMIT, Outcome.DIVERGED)
 _WIDTH = 60
 _ABSENT = object()
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """Conditions that determine a run's samples, as comparable trees.
-
-    Attributes:
-        normalised: normalised protocol, as `Plan.normalised`; only its tests are compared.
-        versions: versions of the program and of libraries.
-        plug_ins: plug-ins in use, as from `provenance.plug_ins`.
-    """
-
-    normalised: Tree
-    backend: str
-    backend_options: Tree
-    versions: Mapping[str, str]
-    plug_ins: Sequence[Tree] = ()
 
 
 def check_resumable(run: RunReader) -> None:
@@ -72,7 +55,7 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
     A trial with a fault is among them only if the policy skipped it. Without that decision it ended
     the run, or its retry is missing.
     """
-    skipped = set(_skipped(run))
+    skipped = _skipped(run)
     return {
         each.trial.number: each.ending.outcome
         for each in run.trials
@@ -81,49 +64,31 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
     }
 
 
-def _skipped(run: RunReader) -> Iterator[int]:
+def _skipped(run: RunReader) -> set[int]:
     """Numbers of the trials that the policy skipped after their last attempt."""
-    skipped: dict[int, bool] = {}
+    skipped: set[int] = set()
     for entry in run.story.entries:
         if isinstance(entry, TrialFinished):
-            skipped[entry.trial] = False
+            skipped.discard(entry.trial)
         elif isinstance(entry, Decision) and entry.trial is not None and entry.decision == "skip":
-            skipped[entry.trial] = True
-    return (trial for trial, skip in skipped.items() if skip)
+            skipped.add(entry.trial)
+    return skipped
 
 
-def archived_conditions(run: RunReader) -> Conditions:
-    """Conditions at the begin of the run."""
-    header = run.header
-    return Conditions(
-        header.normalised,
-        header.backend,
-        header.backend_options,
-        dict(header.versions),
-        header.plugins,
-    )
+def differences(was: RunHeader, now: RunHeader) -> list[str]:
+    """All conditions of the samples that differ, as `dotted.path: was → is`.
 
-
-def differences(was: Conditions, now: Conditions) -> list[str]:
-    """All differing fields as `dotted.path: was → is`, with the paths of `--set`.
-
-    A difference that several tests share, e.g. of a bench, is listed once.
+    The paths are those of `--set`. A difference that several tests share, e.g. of a bench, is
+    listed once.
     """
-    lines = [_line("backend", was.backend, now.backend)] if was.backend != now.backend else []
-    lines += [
-        _line(f"backend.{path}", *values)
-        for path, *values in _compare(was.backend_options, now.backend_options)
+    options = _compare(was.backend_options, now.backend_options, "backend")
+    versions = _compare(shaping(was.versions), shaping(now.versions), "versions")
+    plug_ins = _compare(_by_room(was.plugins), _by_room(now.plugins), "plugins")
+    return [
+        *(_line(*each) for each in options),
+        *_of_tests(_by_name(was.normalised), _by_name(now.normalised)),
+        *(_line(*each) for each in (*versions, *plug_ins)),
     ]
-    lines += _of_tests(_by_name(was.normalised), _by_name(now.normalised))
-    lines += [
-        _line(f"versions.{path}", *values)
-        for path, *values in _compare(shaping(was.versions), shaping(now.versions))
-    ]
-    lines += [
-        _line(f"plugins.{path}", *values)
-        for path, *values in _compare(_by_room(was.plug_ins), _by_room(now.plug_ins))
-    ]
-    return lines
 
 
 def trial_differences(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> list[str]:
@@ -180,9 +145,7 @@ def same_list(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> bool:
 
 def listed(lines: Sequence[str]) -> str:
     """The first `SHOWN` lines, and the number of others."""
-    more = len(lines) - SHOWN
-    shown = [f"  {line}" for line in lines[:SHOWN]]
-    return "\n".join([*shown, *([f"  and {more} more"] if more > 0 else [])])
+    return "\n".join(f"  {line}" for line in shortened(lines, SHOWN))
 
 
 def _by_name(normalised: Tree) -> dict[str, Any]:

@@ -14,10 +14,11 @@ def reference(run: Path) -> str:
     return shlex.quote(run.stem if run.parent == RESULTS else str(run.with_suffix("")))
 
 
-def how_to_go_on(run: Path) -> str:
-    """Suggested commands for an unfinished run, each on its own line."""
+def finished_trials(run: Path) -> str:
+    """Place of an unfinished run, and suggested commands, each on its own line."""
     name = reference(run)
-    return f"to see them, and to continue:\n{typed('report', name)}\n{typed('resume', name)}"
+    commands = f"{typed('report', name)}\n{typed('resume', name)}"
+    return f"the finished trials are in {run}; to see them, and to continue:\n{commands}"
 
 
 def typed(command: str, *words: str) -> str:

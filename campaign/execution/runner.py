@@ -17,6 +17,7 @@ from campaign.archive.reading.archived_metrics import Measure
 from campaign.archive.writing.writer import RunWriter
 from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attempt import Conditions
+from campaign.execution.batches import Batches
 from campaign.execution.executors import OpenExecutor, thread_executor
 from campaign.execution.operator_prompts import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
@@ -78,19 +79,10 @@ def run_plan(
     stages = stages or Stages((), (), writer, {}, lambda trial: "")
     waiting = stages.in_order(trial for trial in trials if trial.number not in finished)
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
+    live = supervision.live
+    batches = Batches(waiting, backend, workers, live=live)
     sequence = TrialSequence(
-        trials,
-        waiting,
-        backend,
-        writer,
-        workers,
-        ledger,
-        ended,
-        stop,
-        policy,
-        attendance,
-        stages,
-        live=supervision.live,
+        trials, batches, backend, writer, ledger, ended, stop, policy, attendance, stages, live
     )
     keeping = SampleRetention.of(policy.keep, trials)
     conditions = Conditions(backend, writer, sequence.halted, supervision, measure, keeping)

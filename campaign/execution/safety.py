@@ -11,7 +11,7 @@ from campaign.backends import calls
 from campaign.backends.interface import Backend
 from campaign.entry_points import one_line
 from campaign.errors import BackendError, CampaignError, ExitCode
-from campaign.execution.run_reference import how_to_go_on
+from campaign.execution.run_reference import finished_trials
 from campaign.recording import SafeState
 
 SAFE = "safe state confirmed: the bench is at rest with its drive off"
@@ -69,9 +69,8 @@ def safe_afterwards(backend: Backend, ended: EarlyEnd) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        go_on = f"; {how_to_go_on(ended.kept)}" if ended.kept else ""
-        kept = f"; the finished trials are in {ended.kept}" if ended.kept else ""
-        raise AbortedError(f"stopped at once{kept}{go_on}") from None
+        kept = f"; {finished_trials(ended.kept)}" if ended.kept else ""
+        raise AbortedError(f"stopped at once{kept}") from None
     finally:
         make_safe(backend, ended)
 

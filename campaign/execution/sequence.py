@@ -6,8 +6,9 @@ decision is journaled before it takes effect.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, wait
+from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 
 from campaign.archive.layout.journal import Entry
@@ -40,59 +41,49 @@ MOST_LOST = 3
 _Ended = tuple[Trial, AttemptEnd, Sequence[Entry]]
 
 
+@dataclass(eq=False)
 class TrialSequence:
     """Executes trials until none are left or the run must end.
 
     Attributes:
+        trials: all of the run.
+        batches: the trials to execute.
+        live: whether a bench moves.
         outside: detects a panic stop.
     """
 
-    def __init__(
-        self,
-        trials: Sequence[Trial],
-        waiting: Iterable[Trial],
-        backend: Backend,
-        writer: RunWriter,
-        workers: int,
-        ledger: Ledger,
-        ended: EarlyEnd,
-        stop: StopSwitch,
-        policy: Policy,
-        attendance: Attendance,
-        stages: Stages,
-        *,
-        live: bool,
-    ) -> None:
-        self._stages = stages
-        self._live = live
-        self._batches = Batches(waiting, backend, workers, live=live)
+    trials: Sequence[Trial]
+    batches: Batches
+    backend: Backend
+    writer: RunWriter
+    ledger: Ledger
+    ended: EarlyEnd
+    stop: StopSwitch
+    policy: Policy
+    attendance: Attendance
+    stages: Stages
+    live: bool
+
+    def __post_init__(self) -> None:
         self._running: dict[Future[None], Sequence[Trial]] = {}
         self._under_way: dict[int, Trial] = {}
         self._news: SimpleQueue[_Ended | Future[None]] = SimpleQueue()  # trials that ended, batches
-        self._backend = backend
-        self._writer = writer
-        self._ledger = ledger
-        self._ended = ended
-        self._stop = stop
-        self.outside = OutsideWatch(backend, stop, self._stopped_outside)
-        self._attendance = attendance
-        self._policy = policy
-        self._trials = trials
+        self.outside = OutsideWatch(self.backend, self.stop, self._stopped_outside)
         self._kept_extremes = False
-        self._responses = Responses(policy)
-        self._rests = Rests(policy.rest)
-        self._set_up = SetUp(attendance.operator, writer)
+        self._responses = Responses(self.policy)
+        self._rests = Rests(self.policy.rest)
+        self._set_up = SetUp(self.attendance.operator, self.writer)
         self._said: set[tuple[str, str]] = set()
 
     def execute(self, executor: BatchExecutor) -> None:
         """Keep all workers busy. Raises errors of the archive, and KeyboardInterrupt."""
         try:
             while True:
-                if self._live and not (self._running or self.halted()):  # the bench is at rest
+                if self.live and not (self._running or self.halted()):  # the bench is at rest
                     for _ in range(AT_REST):
-                        self._writer.seal_next()
+                        self.writer.seal_next()
                 while len(self._running) < executor.most_pending and (batch := self._next()):
-                    self._ledger.begin(*batch)
+                    self.ledger.begin(*batch)
                     self._under_way |= {trial.number: trial for trial in batch}
                     future = executor.submit(batch, lambda *ended: self._news.put(ended))
                     self._running[future] = batch
@@ -112,13 +103,13 @@ class TrialSequence:
         """Process all ended trials and batches. If there are none, copy an ended trial of a
         simulation into the sealed file, or wait.
         """
-        copied = not (self._live or self.halted()) and self._writer.seal_next(
+        copied = not (self.live or self.halted()) and self.writer.seal_next(
             1 if self._news.empty() else MOST_WAITING
         )
         try:
             news = [self._news.get(timeout=0.0 if copied else LOOK)]
         except Empty:
-            self._ledger.look()
+            self.ledger.look()
             executor.look()
             return
         while not self._news.empty():
@@ -126,7 +117,7 @@ class TrialSequence:
         ended = [each for each in news if isinstance(each, tuple)]
         ended.sort(key=lambda each: each[0].number)
         if entries := [entry for each in ended for entry in each[2]]:
-            self._writer.note(*entries)  # before any report
+            self.writer.note(*entries)  # before any report
         for trial, executed, _ in ended:
             self._settle(trial, executed)
         for each in news:
@@ -141,24 +132,24 @@ class TrialSequence:
         """Put the trials of a lost batch first, except those that have ended."""
         lost = [t for t in batch if self._under_way.pop(t.number, None) is not None]
         text = f"{error}; trials to repeat: {', '.join(trial.name for trial in lost) or 'none'}"
-        self._writer.decision("worker lost", text)
-        self._ledger.remark(text)
+        self.writer.decision("worker lost", text)
+        self.ledger.remark(text)
         if error.times > MOST_LOST:
             self._fail(f"{error}; the memory may be too small: try `--workers 1`")
-        self._batches.insert(lost)
+        self.batches.insert(lost)
 
     def halted(self) -> bool:
         """Whether the run is to end."""
-        return self._stop() or bool(self._ended.fault)
+        return self.stop() or bool(self.ended.fault)
 
     def _fail(self, reason: str) -> None:
-        self._ended.fault = self._ended.fault or reason
+        self.ended.fault = self.ended.fault or reason
 
     def _next(self) -> Sequence[Trial]:
         """The trials to begin now; empty if none are left, or if others must end first."""
         self._follow()
         self._keep_extremes()
-        trial = self._batches.first
+        trial = self.batches.first
         if trial is None or self._is_over():
             return ()
         under_way = sum(each.task.duration for each in self._under_way.values())
@@ -168,36 +159,36 @@ class TrialSequence:
             self._rest()
             due = not self._is_over() and self._set_up.is_due(trial)
             if due and not self._set_up.confirm(trial, self.outside):
-                self._stop.request("the operator")
+                self.stop.request("the operator")
         if self._is_over():
             return ()
-        return self._batches.take(self._rests.left - under_way, self._set_up.is_due)
+        return self.batches.take(self._rests.left - under_way, self._set_up.is_due)
 
     def _follow(self) -> None:
         """Evaluate every stage whose trials have ended; its trials are the next ones.
 
         No stage is evaluated after the end of the run: a resume may repeat some of its trials.
         """
-        while self._stages.is_due and not self._is_over():
-            trials, remarks = self._stages.ask()
-            self._batches.insert(trials)
-            self._ledger.add(trials)
+        while self.stages.is_due and not self._is_over():
+            trials, remarks = self.stages.ask()
+            self.batches.insert(trials)
+            self.ledger.add(trials)
             for remark in remarks:
-                self._ledger.remark(remark)
+                self.ledger.remark(remark)
 
     def _keep_extremes(self) -> None:
         """After all trials: repeat the trials with extreme metrics to keep their samples."""
-        waits = self._batches.first is not None or self._running or self._is_over()
-        if self._policy.keep != "extremes" or waits or self._kept_extremes:
+        waits = self.batches.first is not None or self._running or self._is_over()
+        if self.policy.keep != "extremes" or waits or self._kept_extremes:
             return
         self._kept_extremes = True
-        reasons = extremes(self._trials, self._writer.metrics())
-        again = [trial for trial in self._trials if trial.number in reasons]
-        again = [trial for trial in again if self._writer.attempt(trial) == 2]
+        reasons = extremes(self.trials, self.writer.metrics())
+        again = [trial for trial in self.trials if trial.number in reasons]
+        again = [trial for trial in again if self.writer.attempt(trial) == 2]
         for trial in again:
-            self._writer.decision("keep samples", reasons[trial.number], trial.number)
-            self._ledger.take_back(trial)
-        self._batches.insert(again)
+            self.writer.decision("keep samples", reasons[trial.number], trial.number)
+            self.ledger.take_back(trial)
+        self.batches.insert(again)
 
     def _is_over(self) -> bool:
         """Whether the run is to end; between trials this also polls the bench."""
@@ -205,16 +196,16 @@ class TrialSequence:
 
     def _stopped_outside(self, stop: PanicStop) -> None:
         reason = f"by {stop.by}, stop number {stop.count}"
-        self._writer.decision("panic stop", reason)
-        self._ledger.remark(f"PANIC STOP by {stop.by}: the bench stays off until that is cleared")
+        self.writer.decision("panic stop", reason)
+        self.ledger.remark(f"PANIC STOP by {stop.by}: the bench stays off until that is cleared")
 
     def _rest(self) -> None:
-        rest = self._rests.due
-        if rest is None:
+        rest = self.policy.rest
+        if rest is None or self._rests.left > 0.0:
             return
-        self._writer.decision("rest", f"{rest.pause:g} s after {rest.every:g} s of bench time")
-        self._ledger.remark(f"the bench rests for {rest.pause:g} s")
-        self._attendance.wait(rest.pause, self.outside)
+        self.writer.decision("rest", f"{rest.pause:g} s after {rest.every:g} s of bench time")
+        self.ledger.remark(f"the bench rests for {rest.pause:g} s")
+        self.attendance.wait(rest.pause, self.outside)
         self._rests.taken()
 
     def _settle(self, trial: Trial, executed: AttemptEnd) -> None:
@@ -225,53 +216,53 @@ class TrialSequence:
         self._say_remarks(trial, executed)
         self._say_unmeasured(trial, executed)
         if executed.gave_up:
-            self._ended.bug = self._ended.bug or executed.bug
+            self.ended.bug = self.ended.bug or executed.bug
             self._fail(ending.reason)
         elif ending.outcome is Outcome.INTERRUPTED and not self.halted():
             self.outside.look()
-            self._stop.request(ending.reason or "the bench")  # a person at the bench stopped it
+            self.stop.request(ending.reason or "the bench")  # a person at the bench stopped it
         elif ending.safe_state is not SafeState.CONFIRMED and not self.halted():
             self._make_safe(trial)
         if self._is_final(trial, ending):
-            self._ledger.end(trial, ending)
-            self._stages.ended(trial)
+            self.ledger.end(trial, ending)
+            self.stages.ended(trial)
 
     def _say_remarks(self, trial: Trial, executed: AttemptEnd) -> None:
         """Report each remark once per test."""
         for remark in executed.remarks:
             if (trial.test, remark) not in self._said:
                 self._said.add((trial.test, remark))
-                self._ledger.remark(f"{trial.test}: {remark}")
+                self.ledger.remark(f"{trial.test}: {remark}")
 
     def _say_unmeasured(self, trial: Trial, executed: AttemptEnd) -> None:
         if executed.unmeasured:
-            self._writer.decision("no metrics", executed.unmeasured, trial.number)
-            self._ledger.remark(f"{trial.name}: no metrics are archived: {executed.unmeasured}")
+            self.writer.decision("no metrics", executed.unmeasured, trial.number)
+            self.ledger.remark(f"{trial.name}: no metrics are archived: {executed.unmeasured}")
 
     def _make_safe(self, trial: Trial) -> None:
         """Make the bench safe after an unconfirmed trial; end the run if it is not confirmed."""
-        make_safe(self._backend, self._ended)
-        state = f"now {self._ended.safe_state}"
-        self._writer.decision(
+        make_safe(self.backend, self.ended)
+        state = f"now {self.ended.safe_state}"
+        self.writer.decision(
             "make safe", f"the safe state was not confirmed; {state}", trial.number
         )
-        self._ledger.remark(f"{trial.name}: the safe state was not confirmed; {state}")
-        if self._ended.unsafe:
-            self._fail(f"{self._ended.unsafe} after {trial.name}")
+        self.ledger.remark(f"{trial.name}: the safe state was not confirmed; {state}")
+        if self.ended.unsafe:
+            self._fail(f"{self.ended.unsafe} after {trial.name}")
 
     def _is_final(self, trial: Trial, ending: Ending) -> bool:
         """Apply the policy; False if the trial will be executed again."""
-        if not ending.outcome.failed or self._ended.fault:
+        if not ending.outcome.failed or self.ended.fault:
             return True
         choice = self._responses.choose(trial, ending)
-        self._writer.decision(choice.do, choice.reason, trial.number)
+        self.writer.decision(choice.do, choice.reason, trial.number)
         if choice.do == "abort":
             self._fail(f"aborted after {trial.name}: {choice.reason}")
         if choice.do != "retry":
             return True
-        self._ledger.repeat(trial, ending)
+        self.ledger.attempt_ended(trial, ending)
         pause = f" in {choice.pause:g} s" if choice.pause else ""
-        self._ledger.remark(f"{trial.name} is executed again{pause}")
-        self._attendance.wait(choice.pause, self.outside)
-        self._batches.insert([trial])  # after a stop it remains for a resume
+        self.ledger.remark(f"{trial.name} is executed again{pause}")
+        self.attendance.wait(choice.pause, self.outside)
+        self.batches.insert([trial])  # after a stop it remains for a resume
         return False

@@ -21,15 +21,14 @@ from campaign.archive.writing.writer import RunWriter
 from campaign.axis_kind import each_in_axis_terms
 from campaign.backends import calls
 from campaign.backends.interface import Backend
-from campaign.channels import missing
-from campaign.errors import CampaignError, UsageError
+from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.execution.safety import describe
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, options_of
 from campaign.protocol.stage_trials import Refusal, StageTrials, TooMuchError, follow
 from campaign.protocol.stages import PlannedStage, place_of
 from campaign.reason import Cause
-from campaign.text import count
+from campaign.text import count, shortened
 from campaign.trial import Role, Trial, canonical_json
 
 NOTHING_TOLD = Cause("nothing found", "the recording shows nothing")
@@ -99,8 +98,7 @@ class Stages:
     @property
     def failed(self) -> str:
         """Why trials of stages are missing; empty if none are missing."""
-        more = len(self._failures) - 1
-        return f"{self._failures[0]}{f', and {more} more' if more > 0 else ''}" if more >= 0 else ""
+        return ", ".join(shortened(self._failures, 1))
 
     def in_order(self, trials: Iterable[Trial]) -> list[Trial]:
         """Trials in order of execution: those of evaluated stages first, as before a resume."""
@@ -127,10 +125,8 @@ class Stages:
         outcome, reason = StageTrials(()), ""
         try:
             outcome = self._follow(stage)
-        except (TooMuchError, CampaignError) as error:
-            reason = str(error)
         except (Exception, SystemExit) as error:  # noqa: BLE001 - must not cost the run
-            reason = describe(error)
+            reason = str(error) if isinstance(error, TooMuchError) else describe(error)
         what = (stage.test, stage.number, stage.name, stage.point)
         entry = trials_followed(utc_now(), *what, outcome.trials, outcome.refused, reason)
         self._archive.note(entry)
@@ -184,8 +180,7 @@ def refusal_of(backend: Backend) -> Refusal:
     def why(trial: Trial) -> str:
         if reason := calls.refusal(backend, trial):
             return reason
-        known = calls.channels(backend, trial) if trial.requires else None
-        lacking = () if known is None else missing(trial.requires, known)
+        lacking = calls.unrecorded(backend, trial, trial.requires)
         return f"it requires {', '.join(lacking)}, and that is not recorded" if lacking else ""
 
     return why
@@ -207,7 +202,5 @@ def _remarks(entry: TrialsFollowed) -> list[str]:
     if entry.reason:
         return [_failure(entry)]
     remarks = [f"{entry.title}: {count(len(entry.trials), 'trial follows', 'trials follow')}"]
-    remarks += [f"refused: {each.label}: {each.why}" for each in entry.refused[:TOLD]]
-    if len(entry.refused) > TOLD:
-        remarks.append(f"and {len(entry.refused) - TOLD} more trials are refused")
-    return remarks
+    refused = [f"refused: {each.label}: {each.why}" for each in entry.refused]
+    return remarks + shortened(refused, TOLD, "more trials are refused")

@@ -80,11 +80,7 @@ class TrialMeasurement:
             if experiment is None or experiment.measure is None:
                 return ArchivedMetrics()
             estimates = checked(measured(experiment, data))
-            return (
-                ArchivedMetrics(estimates, self._by(data.trial.kind))
-                if estimates
-                else ArchivedMetrics()
-            )
+            return ArchivedMetrics(estimates, self._by(data.trial.kind) if estimates else "")
         except (ValueError, UsageError) as error:
             sides = sides_in(data.trial.bench)
             return ArchivedMetrics(problem=in_axis_terms(_one_line(str(error)), sides))

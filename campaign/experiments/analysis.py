@@ -26,7 +26,6 @@ from campaign.reason import Cause
 from campaign.result import RecordingDoubt, Result
 from campaign.trial import canonical_json
 
-EMPTY = Result()
 TOO_LONG = Cause(
     "too long",
     "it has {samples:.3g} samples, more than the {most:.0e} that are looked at in one: cut it by "
@@ -66,7 +65,7 @@ def _result_of(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> 
     usable = with_named_tables(
         _without(data, [item for item, defect in doubted_of if defect and defect.fatal])
     )
-    result = EMPTY
+    result = Result()
     if usable.trials or not data.trials:
         result = _of_draws(experiment, usable, draws) if draws[1:] else analysed(experiment, usable)
     doubts = (*result.doubts, *before)
@@ -228,7 +227,7 @@ def _of_draws(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> R
 def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
     """Result of one draw; a failed analysis gives a note."""
     if not part.trials:
-        return EMPTY
+        return Result()
     try:
         return analysed(experiment, part)
     except (ArchiveError, UsageError):

@@ -21,7 +21,7 @@ from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, drop_interval_if_deterministic
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, validated
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
-from campaign.experiments.shared.common import closed
+from campaign.experiments.shared.common import closed, number_of
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
     ConditionGroup,
@@ -138,7 +138,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
     Not determined where samples of a cycle were lost (NaN).
     """
     options = validated(FrictionLagOptions, data.trial.options)
-    frequency = float(str(data.trial.point["frequency"]))
+    frequency = number_of(data.trial, "frequency")
     common = options.mean_rate + options.amplitude * np.linspace(-0.98, 0.98, 99)
     recording = data.recording()
     shapes, coarse = [], []

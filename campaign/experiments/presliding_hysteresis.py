@@ -20,7 +20,7 @@ from campaign.estimation.intervals import shifted_by
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics, validated
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
-from campaign.experiments.shared.common import closed
+from campaign.experiments.shared.common import closed, number_of
 from campaign.experiments.shared.friction_models import ConditionGroup, in_models, places
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -30,7 +30,7 @@ from campaign.signals import Polyline
 from campaign.trial import Task, TrialRequest
 from campaign.units import Angle, Frequency, in_words
 
-OWN = ("amplitude",)
+AMPLITUDE = "amplitude"
 PER_CYCLE = 400
 """Linear segments of the prescribed rate in a cycle."""
 SMALL = 1e-4
@@ -73,7 +73,7 @@ def _trials(options: PreslidingHysteresisOptions, bench: Bench) -> Iterator[Tria
                     window=(last.start, last.stop),
                     sample_rate=options.sample_rate,
                 ),
-                point={**point, "amplitude": amplitude},
+                point={**point, AMPLITUDE: amplitude},
                 bench=tree,
                 windows=windows,
             )
@@ -120,10 +120,6 @@ def loop_sizes(displacement: Array, friction: Array, amplitude: float) -> dict[s
     return {"peak": peak, "hysteresis_energy": energy, "loss_factor": loss}
 
 
-def _amplitude_of(data: TrialData) -> float:
-    return float(str(data.trial.point["amplitude"]))
-
-
 def _loop(data: TrialData, window: Window) -> tuple[Array, Array]:
     """Displacement (rad) and friction (N m) of a closed cycle, each (n,)."""
     cut = data.recording().window(window.start, window.stop)
@@ -140,7 +136,8 @@ def _windows(data: TrialData) -> tuple[Window, ...]:
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Sizes of the last loop; their difference from the loop before is a systematic part."""
     before, last = (
-        loop_sizes(*_loop(data, window), _amplitude_of(data)) for window in _windows(data)
+        loop_sizes(*_loop(data, window), number_of(data.trial, AMPLITUDE))
+        for window in _windows(data)
     )
     return [
         shifted_by(
@@ -153,18 +150,18 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 
 def _analyse(data: TestData) -> Result:
-    groups = places(data.completed(), OWN)
+    groups = places(data.completed(), (AMPLITUDE,))
     if not groups:
         return Result()
     loops = [
         (place, [(item, metrics(item, _measure)) for item in place.trials]) for place in groups
     ]
     every = [
-        ({**place.point, "amplitude": _amplitude_of(item)}, own)
+        ({**place.point, AMPLITUDE: number_of(item.trial, AMPLITUDE)}, own)
         for place, items in loops
         for item, own in items
     ]
-    largest = max(_amplitude_of(item) for place in groups for item in place.trials)
+    largest = max(number_of(item.trial, AMPLITUDE) for place in groups for item in place.trials)
     display, energy = ("urad", "uJ") if largest <= SMALL else ("mrad", "mJ")
     table = Table(
         key="presliding-hysteresis",
@@ -183,7 +180,7 @@ def _analyse(data: TestData) -> Result:
     )
     findings = tuple(Finding.of(own["hysteresis_energy"], at) for at, own in every)
     small = [amplitude for place in groups for amplitude in _small(place)]
-    again = f" Beside them those up to {_amplitude(max(small), display)} again." if small else ""
+    again = f" Beside them those up to {_shown(max(small), display)} again." if small else ""
     figure = Figure(
         key="presliding-hysteresis",
         title="Friction over small displacements",
@@ -208,10 +205,11 @@ def _what_shows(
     known = [each for each in items if math.isfinite(each[1]["hysteresis_energy"].value)]
     if not known:
         return ""
-    ordered = sorted(known, key=lambda each: _amplitude_of(each[0]))
+    ordered = sorted(known, key=lambda each: number_of(each[0].trial, AMPLITUDE))
     parts = [
         f"{amount(own['hysteresis_energy'].value, 'J', energy)} a cycle at "
-        f"{_amplitude(_amplitude_of(item), unit)} (loss factor {own['loss_factor'].value:.2g})"
+        f"{_shown(number_of(item.trial, AMPLITUDE), unit)} "
+        f"(loss factor {own['loss_factor'].value:.2g})"
         for item, own in (ordered[0], ordered[-1])
     ]
     start = f"{place.label} loses" if place.label else "Lost are"
@@ -220,7 +218,7 @@ def _what_shows(
 
 def _small(place: ConditionGroup) -> list[float]:
     """Amplitudes (rad) of the loops that are too small to read in a panel of all loops."""
-    known = [_amplitude_of(item) for item in place.trials]
+    known = [number_of(item.trial, AMPLITUDE) for item in place.trials]
     return [each for each in known if each <= READABLE * max(known)]
 
 
@@ -230,7 +228,7 @@ def _panels(place: ConditionGroup, display: str) -> Iterator[Panel]:
     yield whole
     small = _small(place)
     if small:
-        near = [_amplitude_of(item) in small for item in place.trials]
+        near = [number_of(item.trial, AMPLITUDE) in small for item in place.trials]
         curves = [curve for curve, shown in zip(whole.curves, near, strict=True) if shown]
         title = f"{place.label}, small amplitudes" if place.label else "Small amplitudes"
         yield replace(whole, curves=curves, title=title)
@@ -240,7 +238,7 @@ def _panel(place: ConditionGroup, display: str) -> Panel:
     curves = [
         Curve(*_loop(item, _windows(item)[-1]), label, label, "loop")
         for item in place.trials
-        for label in [_amplitude(_amplitude_of(item), display)]
+        for label in [_shown(number_of(item.trial, AMPLITUDE), display)]
     ]
     return Panel(
         Axis("Displacement", "rad", display),
@@ -250,7 +248,7 @@ def _panel(place: ConditionGroup, display: str) -> Panel:
     )
 
 
-def _amplitude(amplitude: float, display: str) -> str:
+def _shown(amplitude: float, display: str) -> str:
     if display == "urad":
         return f"± {amplitude * 1e6:.3g} µrad"
     return f"± {in_words(amplitude, 'rad', 'mrad')}"

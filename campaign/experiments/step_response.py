@@ -194,7 +194,7 @@ def _evaluate(data: TrialData, paths: list[str]) -> Step:
     if options.compensation != "none" or "compensation" in paths:
         words.append(method_label(options.compensation))
     others = {path: place.get(path) for path in paths if path not in ("compensation", "linear")}
-    label = ", ".join([*words, *swept_words(others, data.trial, StepResponseOptions)])
+    label = ", ".join([*words, *swept_words(others, data.trial)])
     plain = options.linear and options.compensation == "none"
     return Step(
         place,

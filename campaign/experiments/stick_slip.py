@@ -199,7 +199,7 @@ def _analyse(data: TestData) -> Result:
         "softer spring."
         for load in loads
     )
-    drawn = map_of(measured, StickSlipOptions) or _figure(measured)
+    drawn = map_of(measured) or _figure(measured)
     return Result((table,), tuple(filter(None, (drawn,))), findings, tuple(notes))
 
 
@@ -318,7 +318,7 @@ def _counts(measured: Measured) -> str:
     return f"Stick-slip in {', '.join(parts)}."
 
 
-def map_of(measured: Measured, options: type[Options]) -> Figure | None:
+def map_of(measured: Measured) -> Figure | None:
     """Map of stick-slip over the two swept numbers with most values; None for few pulls.
 
     Rests in several periods distinguish stick-slip from a decaying oscillation.
@@ -334,7 +334,7 @@ def map_of(measured: Measured, options: type[Options]) -> Figure | None:
     trial = measured[0][0].trials[0].trial
     x_axis, y_axis = (
         replace(
-            axis_of(path, trial, options),
+            axis_of(path, trial),
             scale="log" if min(swept[path]) > 0.0 else "linear",
             label=name_of(path.split(".")[-1]),
         )
@@ -343,7 +343,7 @@ def map_of(measured: Measured, options: type[Options]) -> Figure | None:
     panels: dict[str, list[tuple[str, float, float]]] = {}
     for place, found in measured:
         others = {path: value for path, value in place.point.items() if path not in across}
-        texts = words(others, trial, options, frozenset(others))
+        texts = words(others, trial, frozenset(others))
         title = ", ".join(reversed(list(texts)))
         x, y = (float(str(place.point[path])) for path in across)
         panels.setdefault(title, []).append((_kind(found, place), x, y))

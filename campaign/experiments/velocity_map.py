@@ -32,7 +32,7 @@ from campaign.result import Result
 def _analyse(data: TestData) -> Result:
     if data.model is not None:
         return identified(data)
-    maps = of_each_place(data.completed(), OWN, lambda *place: one_map(*place)[0])
+    maps = of_each_place(data.completed(), OWN, lambda group: one_map(group)[0])
     notes = settling_notes(item.trial for item in data.completed())
     figures = (*maps.figures, *example_figure(data))
     return replace(maps, figures=figures, notes=(*notes, *maps.notes))

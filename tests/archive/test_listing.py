@@ -106,6 +106,25 @@ def test_what_another_program_recorded_is_to_be_imported(tmp_path, content):
     assert find_run(tmp_path, str(tmp_path / "cut.nxs")) == tmp_path / "cut.nxs"
 
 
-def test_importing_the_archive_does_not_import_hdf5():
-    code = "import sys, campaign.archive; sys.exit('h5py' in sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)
+LIST = """
+import sys
+sys.argv = ["campaign", "list", "--results", sys.argv[1]]
+from campaign.cli.main import main
+try:
+    main()
+except SystemExit:
+    pass
+from campaign.entry_points import installed
+print(sorted({"h5py", "numpy"} & set(sys.modules)), installed.cache_info().misses)
+"""
+
+
+def test_a_listing_with_an_index_imports_no_numpy_and_no_hdf5_and_searches_no_packages(
+    tmp_path, kit
+):
+    kit.run(tmp_path, [10])
+    list_runs(tmp_path)
+    command = [sys.executable, "-c", LIST, str(tmp_path)]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert len(lines) == 3, lines
+    assert lines[-1] == "[] 0"

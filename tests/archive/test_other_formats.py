@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from campaign.archive.reading.open_run import open_run
-from campaign.archive.reading.summary import summarise
+from campaign.archive.reading.summarise import summarise
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.writer import RunWriter

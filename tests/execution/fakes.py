@@ -15,7 +15,7 @@ from campaign.archive.layout.journal import TrialsFollowed
 from campaign.archive.reading.archived_metrics import Measure
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
-from campaign.execution.operator_prompts import Attendance, Operator, SimulatedOperator
+from campaign.execution.operator_prompts import AbsentOperator, Attendance, Operator
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
@@ -228,7 +228,7 @@ class Lab:
         self.display: Callable[[Progress], object] = self.progress.append
         self.pauses: list[float] = []
         self.pause: Callable[[float], object] = self.pauses.append
-        self.operator: Operator = SimulatedOperator()
+        self.operator: Operator = AbsentOperator()
         self.policy = Policy.model_validate(policy, context={"si": True})
 
     def run(self, workers: int = 1, **more: Any) -> RunOutcome:

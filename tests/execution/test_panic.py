@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from campaign.errors import ExitCode
-from campaign.execution.operator_prompts import Attendance, SimulatedOperator, wait_unless
+from campaign.execution.operator_prompts import AbsentOperator, Attendance, wait_unless
 from campaign.recording import Ending, Fault, Outcome, PanicStop, SafeState
 from tests.execution.fakes import COMPLETED, Lab, SwitchedBench
 
@@ -80,7 +80,7 @@ def test_no_retry_follows_it_however_the_trial_ended() -> None:
     hot = Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE)
     retry = {"default": {"do": "retry", "times": 5, "pause": 1e9}}
     lab = Lab(3, stopped_in(1, hot), faults=retry)
-    waits = Attendance(SimulatedOperator(), wait_unless)
+    waits = Attendance(AbsentOperator(), wait_unless)
     assert lab.run(attendance=waits).reason == "panic stop by ada"
     assert [number for number, _ in lab.archive.attempts] == [1]
 

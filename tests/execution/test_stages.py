@@ -14,7 +14,7 @@ import pytest
 from campaign.archive.layout.followup_trials import trials_in
 from campaign.archive.layout.run_status import RunStatus
 from campaign.errors import ExitCode
-from campaign.execution.operator_prompts import Attendance, SimulatedOperator
+from campaign.execution.operator_prompts import AbsentOperator, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
@@ -119,7 +119,7 @@ class Run:
             self.planned(), trials, self.archive, {"kind": self.experiment},
             refusal_of(self.backend), finished=finished, asked=asked,
         )  # fmt: skip
-        waits = Attendance(SimulatedOperator(), lambda seconds, stop: self.pauses.append(seconds))
+        waits = Attendance(AbsentOperator(), lambda seconds, stop: self.pauses.append(seconds))
         return run_plan(
             trials, self.backend, self.archive, workers=workers, display=self.progress.append,
             stop=self.stop, policy=self.policy, attendance=waits, finished=finished, stages=stages,

@@ -20,7 +20,7 @@ def test_a_caption_says_where_its_bars_are_others_than_the_intervals_of_the_tabl
     found = {"breakaway_torque": own, "bristle_stiffness": own}
     place = {"position": 0.0, "direction": "positive"}
     (item,) = execute(trials("breakaway", platform(), {**TWO, "positions": ["0 deg"]}))
-    figure = position_figure(Ramps((item,), (place,), (found,)), {"mean": found}, "")
+    figure = position_figure(Ramps((item,), (place,), (found,)), {"mean": found})
     (bars,) = (curve for curve in figure.panels[1].curves if curve.series == "positive")
     assert bars.low is not None
     assert bars.high is not None

@@ -163,7 +163,7 @@ def test_a_damping_below_what_the_viscous_friction_takes_of_it_is_unphysical() -
 
 def test_a_mode_of_a_raw_response_passes_the_gate(monkeypatch: pytest.MonkeyPatch) -> None:
     wide = number("resonance", 90.0, 80.0)
-    monkeypatch.setattr(frequency_response, "_local_of_axis", lambda *_: {"resonance": wide})
+    monkeypatch.setattr(frequency_response, "_local", lambda *_: {"resonance": wide})
     monkeypatch.setattr(frequency_response, "too_few", lambda _: NO_BASE())
     masses: Any = SimpleNamespace(drive=None, places={}, reason=NO_BASE(), axis=None, bent="")
     best: Any = SimpleNamespace(source=None, margins=None)

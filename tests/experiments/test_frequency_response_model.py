@@ -355,12 +355,17 @@ def test_realisations_of_one_amplitude_are_kept_together() -> None:
     """A torque loop and noise change their rms by a few percent, another command by more."""
     sizes = [1.0, 0.97, 1.04, 0.5, 0.52]
     wave = np.sin(2 * np.pi * np.arange(256) / 64)
-    told = [
-        (None, SimpleNamespace(number=k, rate=64.0, leading=np.r_[np.zeros(128 * k), size * wave]))
+    trials = [
+        SimpleNamespace(
+            data=SimpleNamespace(trial=SimpleNamespace(number=k)),
+            rate=64.0,
+            leading=np.r_[np.zeros(128 * k), size * wave],
+        )
         for k, size in enumerate(sizes)
     ]
-    groups = by_amplitude(told, 2.0)  # type: ignore[arg-type]
-    assert [[signal.number for _, signal in group] for group in groups] == [[0, 1, 2], [3, 4]]
+    groups = by_amplitude(trials, 2.0)  # type: ignore[arg-type]
+    numbers = [[signal.data.trial.number for signal in group] for group in groups]
+    assert numbers == [[0, 1, 2], [3, 4]]
 
 
 def noise(duration: float, size: float) -> Polyline:

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from campaign.experiments.shared.motion_series import MOST_ROWS, kind_of, motion_signal, read_table
+from campaign.experiments.shared.motion_series import MOST_ROWS, kind_of, motion_signal
 from campaign.experiments.stabilization.experiment import EXPERIMENT, StabilizationOptions
 from campaign.experiments.stabilization.hull_motion import SeriesMotion
 from campaign.options import TextFile
 from campaign.physics.base_motion import base_rate
-from campaign.units import ANGLE, ANGULAR_RATE
 from tests.experiments.laboratory import analyse, execute, finding, table, trials
 from tests.physics.benches import bench
 
@@ -52,9 +51,15 @@ def test_the_hull_comes_from_rest() -> None:
     np.testing.assert_allclose(ramp, np.array([0.0, 0.5, 1.0]) * (VALUE[0] + 0.3), atol=1e-12)
 
 
+def series(text: str, **options: str) -> SeriesMotion:
+    file = TextFile("a.csv", text)
+    settings = {"kind": "series", "file": file, "value": "deg/s", "settle": "0 s", **options}
+    return SeriesMotion.model_validate(settings)
+
+
 def test_reading_units_comments_and_columns() -> None:
     text = "# logger 7\n\nt ; roll;x\n10;180;0\n20;-90;1\n\n40;0;2\n"
-    time, value = read_table(text, "a.csv", ("t", "roll"), "ms", "deg/s", ANGULAR_RATE)
+    time, value = series(text, time="ms", time_column="t", value_column="roll").samples()
     np.testing.assert_allclose(time, [0.0, 0.010, 0.030])
     np.testing.assert_allclose(value, [np.pi, -np.pi / 2, 0.0])
 
@@ -83,13 +88,13 @@ def test_the_unit_says_what_was_measured(unit: str, kind: str) -> None:
 )
 def test_a_bad_row_is_named(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        read_table(text, "a.csv", ("time", "value"), "s", "deg/s", ANGULAR_RATE)
+        series(text)
 
 
 def test_a_series_is_of_bounded_size() -> None:
     rows = "".join(f"{i},0\n" for i in range(MOST_ROWS + 1))
     with pytest.raises(ValueError, match=f"a.csv:{MOST_ROWS + 2}: more than"):
-        read_table("time,value\n" + rows, "a.csv", ("time", "value"), "s", "deg", ANGLE)
+        series("time,value\n" + rows)
 
 
 @pytest.mark.parametrize(

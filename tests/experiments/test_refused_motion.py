@@ -11,15 +11,20 @@ import pytest
 from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE, TEMPERATURE
 from campaign.estimate import Origin
 from campaign.estimation import gate
+from campaign.estimation.intervals import with_error
 from campaign.estimation.inverse.motion import FilterSettings
-from campaign.estimation.inverse.presliding_share import HARDLY_SLIDES
-from campaign.experiments.any_motion.motions import moved
+from campaign.estimation.inverse.presliding_share import HARDLY_SLIDES, Presliding
+from campaign.experiments.any_motion import inverse_fit
+from campaign.experiments.any_motion.inverse_fit import PRESLIDING, find, in_presliding
+from campaign.experiments.any_motion.motions import moved, with_slowest
 from campaign.experiments.friction_map import steady_recordings
 from campaign.experiments.friction_map.stretches import points_of, slower
 from campaign.parameter import IdentifiedRig
+from campaign.protocol.bench_file import load_bench
 from campaign.trial import Channel, Recording
 from tests.estimation.coverage import holds
 from tests.experiments.asked import asked
+from tests.experiments.laboratory import execute, trials
 
 RATE = 1000.0
 TIME = np.arange(20_000) / RATE
@@ -213,6 +218,44 @@ def test_friction_of_an_axis_that_hardly_slides_is_not_determined(model: str, re
         assert dict(one.reason.values)["reach"] == pytest.approx(reach, rel=0.5)
     assert holds(told["inertia"], 2.0)
     assert not any(each.bench.startswith("friction") for each in found.parameters if each.bench)
+
+
+def test_inertia_of_an_axis_that_never_slides_holds() -> None:
+    """20 N m of the 38 N m at which `simulink` breaks away; least squares leave 26 of 35 kg m^2."""
+    options = {"command": "torque", "torque": "20 N m", "lowest": "1 Hz", "highest": "20 Hz"}
+    more = {"period": "2 s", "realisations": 2}
+    played = execute(trials("excitation", load_bench("simulink"), {**options, **more}))
+    found = asked("inverse_dynamics", played)
+    inertia = {each.estimate.name: each.estimate for each in found.identified.parameters}["inertia"]
+    assert inertia.origin is Origin.MEASURED
+    assert holds(inertia, 35.0)
+    assert any("with bristles in place of dry friction" in note for note in found.notes)
+
+
+def test_an_inertia_beside_bristles_differs_by_its_own_systematic_part() -> None:
+    found = Presliding(reach=0.1, share=0.0, values={"inertia": 3.5})
+    one = with_error("inertia", 3.0, "kg m^2", 0.1, 20.0, "")
+    plain, shifted = (in_presliding(one, found, corrected=own) for own in (False, True))
+    assert (plain.value, plain.low, plain.high) == (one.value, one.low, one.high)
+    assert (shifted.value, shifted.half_width) == pytest.approx((3.5, plain.half_width))
+    assert shifted.low == pytest.approx(one.low + 0.5)
+    for each in (plain, shifted):
+        (part,) = each.systematic
+        assert (part.source, part.standard_uncertainty) == (PRESLIDING, pytest.approx(0.5))
+
+
+def test_instruments_are_not_corrected_by_a_noisy_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    def by_instruments(squares: Any, _: Any) -> Any:
+        return squares, True
+
+    trial = driven(SWING[:8000], on_bristles(0.5)[:8000])
+    monkeypatch.setattr(inverse_fit, "held_against", by_instruments)
+    filtering = FilterSettings.for_rate(RATE)
+    pieces = moved((trial,), filtering)
+    fit = find(pieces, (), with_slowest(filtering, pieces, None))
+    assert fit.bristles is not None
+    assert fit.estimates["inertia"].value == fit.squares["inertia"].value
+    assert fit.estimates["inertia"].value != fit.bristles.values["inertia"]
 
 
 def test_friction_of_an_axis_that_slides_is_determined() -> None:

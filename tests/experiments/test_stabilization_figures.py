@@ -11,7 +11,6 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.experiments.stabilization.errors import MOST_PANELS, error_figures
-from campaign.experiments.stabilization.experiment import StabilizationOptions
 from campaign.experiments.stabilization.figures import stabilization_figures
 from campaign.experiments.stabilization.reversal_figures import HELD, can_be_shown, reversal
 from campaign.recording import Channel, Ending, Outcome, Recording
@@ -201,7 +200,7 @@ def a_trial() -> Trial:
 
 
 def errors(rows: list[dict[str, object]], *paths: str) -> list[Figure]:
-    return list(error_figures(rows, paths, a_trial(), StabilizationOptions))  # type: ignore[arg-type]
+    return list(error_figures(rows, paths, a_trial()))  # type: ignore[arg-type]
 
 
 def test_methods_stand_side_by_side_with_their_intervals() -> None:
@@ -306,7 +305,7 @@ def swept(*places: tuple[float, float, float], methods: tuple[str, ...] = ("none
 
 
 def over_time(*places: tuple[float, float, float]) -> Figure:
-    figures = stabilization_figures(*swept(*places), StabilizationOptions)
+    figures = stabilization_figures(*swept(*places))
     return next(figure for figure in figures if figure.key == "position-error")
 
 
@@ -350,9 +349,7 @@ def torque_figure(added: np.ndarray) -> Figure:
             "compensation_torque": channel("compensation_torque", added),
         },
     )
-    shown = stabilization_figures(
-        [replace(done, samples=samples)], paths, rows, StabilizationOptions
-    )
+    shown = stabilization_figures([replace(done, samples=samples)], paths, rows)
     return next(figure for figure in shown if figure.key == "compensation-torque")
 
 
@@ -380,9 +377,7 @@ def test_what_methods_leave_of_friction_is_shown_side_by_side() -> None:
         trials("stabilization", bench(), {"compensation": name, "cycles": 2, "settle_cycles": 1})[0]
         for name in ("static", "lugre")
     )
-    figures = stabilization_figures(
-        done, ("compensation",), [row(n, 1e-4) for n in "ab"], StabilizationOptions
-    )
+    figures = stabilization_figures(done, ("compensation",), [row(n, 1e-4) for n in "ab"])
     *methods, left = next(f for f in figures if f.key == "compensation-torque").panels
     assert [curve.series for curve in left.curves] == ["static", "lugre"]
     for panel, curve in zip(methods, left.curves, strict=True):
@@ -392,9 +387,9 @@ def test_what_methods_leave_of_friction_is_shown_side_by_side() -> None:
 
 
 def test_the_errors_come_first() -> None:
-    first, *_ = stabilization_figures(*swept((2.0, 36.0, 1e-4)), StabilizationOptions)
+    first, *_ = stabilization_figures(*swept((2.0, 36.0, 1e-4)))
     assert first.key == "error-by-method"
 
 
 def test_without_trials_there_are_no_figures() -> None:
-    assert list(stabilization_figures([], (), [], StabilizationOptions)) == []
+    assert list(stabilization_figures([], (), [])) == []

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from campaign.experiments.shared.swept_words import axis_of, name_of, quantity_of, words
-from campaign.experiments.stabilization.experiment import StabilizationOptions
 from campaign.result import Axis
 from tests.experiments.laboratory import trials
 from tests.physics.benches import bench
@@ -16,7 +15,7 @@ BARE = frozenset({"frequency", "acceleration"})
 
 def said(path: str, value: object) -> str:
     trial = trials("stabilization", bench(), {})[0]
-    (text,) = words({path: value}, trial, StabilizationOptions, BARE)  # type: ignore[dict-item]
+    (text,) = words({path: value}, trial, BARE)  # type: ignore[dict-item]
     return text
 
 
@@ -41,12 +40,12 @@ def test_a_value_has_the_unit_of_its_option_or_of_its_bench(
 
 def test_an_axis_shows_a_readers_unit() -> None:
     trial = trials("stabilization", bench(), {})[0]
-    found = axis_of("acceleration", trial, StabilizationOptions)
+    found = axis_of("acceleration", trial)
     assert found == Axis("Acceleration", "rad/s^2", "deg/s^2")
-    assert axis_of("cycles", trial, StabilizationOptions) == Axis("Cycles")
+    assert axis_of("cycles", trial) == Axis("Cycles")
 
 
 def test_a_number_without_a_unit_has_no_quantity() -> None:
     trial = trials("stabilization", bench(), {})[0]
-    assert quantity_of("cycles", trial, StabilizationOptions) is None
+    assert quantity_of("cycles", trial) is None
     assert name_of("bench.gear.preload.torque") == "preload torque"

@@ -9,7 +9,8 @@ from io import StringIO
 import pytest
 
 from campaign.backends import backends
-from campaign.cli.ask import ASSUMED, AbsentOperator, ConsoleOperator, NotStartedError, allow_motion
+from campaign.cli.ask import ASSUMED, ConsoleOperator, NotStartedError, allow_motion
+from campaign.execution.operator_prompts import AbsentOperator
 from campaign.experiments import experiments
 from campaign.protocol import PlannedTest, load_protocol, make_plan
 from campaign.resources import protocols_folder

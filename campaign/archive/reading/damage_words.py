@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.run_reader import RunReader
 from campaign.plain_text import printable
-from campaign.text import count
+from campaign.text import count, shortened
 
 FILE = "damaged.csv"
 """Name of the list of a run's damage, in a folder exported from the run."""
@@ -34,11 +34,9 @@ def heading(path: Path, damaged: Sequence[Damage]) -> str:
     return f"{path}: damaged, missing or not as it was archived, in {places}"
 
 
-def listed(damaged: Sequence[Damage], most: int) -> Iterator[str]:
+def listed(damaged: Sequence[Damage], most: int) -> list[str]:
     """The first `most` items, one per line, then the number of the others."""
-    yield from map(in_words, damaged[:most])
-    if len(damaged) > most:
-        yield f"and {len(damaged) - most} more"
+    return shortened([in_words(each) for each in damaged], most)
 
 
 def in_one_line(path: Path, damaged: Sequence[Damage]) -> str:

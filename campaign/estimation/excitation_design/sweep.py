@@ -65,5 +65,7 @@ def chirp(lowest: float, highest: float, duration: float, law: Law) -> Chirp:
     cycles = float(Chirp(lowest, highest, duration, law).phase(np.array([duration]))[0])
     cycles /= 2.0 * np.pi
     if round(cycles) < 1:
-        raise ValueError(f"{duration:.4g} s are less than a cycle: raise lowest, or sweep longer")
+        raise ValueError(
+            f"{duration:.4g} s are half a cycle or less: raise lowest, or sweep longer"
+        )
     return Chirp(lowest, highest, duration * round(cycles) / cycles, law)

@@ -30,19 +30,31 @@ def estimates(
     parts: shift of the coefficients by each source of a systematic part, shape (k,); None:
         unknown.
     """
-    coefficients = {}
-    for index, term in enumerate(terms):
-        value, error = float(fit.values[index]), float(fit.robust[index])
-        if fit.freedom < 1.0 or not math.isfinite(fit.quantile * error):
-            coefficients[term.name] = Estimate.without_interval(
-                term.name, value, term.unit, TOO_FEW_ROWS()
-            )
-            continue
-        one = with_error(term.name, value, term.unit, error, fit.freedom, METHOD, fit.quantile)
-        for source, far in parts.items():
-            one = shifted_by(one, source, None if far is None else float(far[index]))
-        coefficients[term.name] = one
-    return coefficients
+    return {
+        term.name: coefficient(
+            fit, index, term.name, term.unit, float(fit.values[index]), METHOD, parts
+        )
+        for index, term in enumerate(terms)
+    }
+
+
+def coefficient(
+    fit: Regression,
+    index: int,
+    name: str,
+    unit: str,
+    value: float,
+    method: str,
+    parts: Mapping[str, Array | None],
+) -> Estimate:
+    """Estimate of one coefficient; parts: see `estimates`."""
+    error = float(fit.robust[index])
+    if fit.freedom < 1.0 or not math.isfinite(fit.quantile * error):
+        return Estimate.without_interval(name, value, unit, TOO_FEW_ROWS())
+    one = with_error(name, value, unit, error, fit.freedom, method, fit.quantile)
+    for source, far in parts.items():
+        one = shifted_by(one, source, None if far is None else float(far[index]))
+    return one
 
 
 def shifts(

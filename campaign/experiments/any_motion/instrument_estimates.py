@@ -18,8 +18,8 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.coefficients import TOO_FEW_ROWS, farthest
+from campaign.estimation.intervals import shifted_by
+from campaign.estimation.inverse.coefficients import coefficient, farthest
 from campaign.estimation.inverse.delay import LONGEST
 from campaign.estimation.inverse.instruments import WEAK, InstrumentFit, by_instruments
 from campaign.estimation.inverse.motion import FilterSettings, Motion
@@ -196,15 +196,17 @@ def _iterated(
         source: farthest(fit.fit.values, [partial(other, *each) for each in every])
         for source, every in others.items()
     }
-    estimates = [
-        _estimate(term.name, term.unit, along, fit, index, float(values[index]), parts)
+    method = f"instruments {along}"
+    estimates = {
+        term.name: coefficient(
+            fit.fit, index, term.name, term.unit, float(values[index]), method, parts
+        )
         for index, term in enumerate(terms)
-    ]
+    }
     delay_estimate = None
     if fitted and abs(delay) < reach:
-        delay_estimate = _estimate("delay", "s", along, fit, len(terms), delay, parts)
-    by_name = {each.name: each for each in estimates}
-    return Instruments(along, loops is not None, fit, by_name, delay_estimate)
+        delay_estimate = coefficient(fit.fit, len(terms), "delay", "s", delay, method, parts)
+    return Instruments(along, loops is not None, fit, estimates, delay_estimate)
 
 
 def _simulated(
@@ -255,26 +257,3 @@ def _regressed(
         return by_instruments(own, other)
     except np.linalg.LinAlgError as error:
         raise ValueError("the simulated motion does not separate the model's terms") from error
-
-
-def _estimate(
-    name: str,
-    unit: str,
-    along: str,
-    found: InstrumentFit,
-    index: int,
-    value: float,
-    parts: Mapping[str, Array | None],
-) -> Estimate:
-    fit = found.fit
-    error = float(fit.robust[index])
-    half = fit.quantile * error
-    if fit.freedom < 1.0 or not math.isfinite(half):
-        return Estimate.without_interval(name, value, unit, TOO_FEW_ROWS())
-    one = Estimate(
-        name, value, unit, value - half, value + half, LEVEL,
-        f"instruments {along}", standard_error=error, freedom=fit.freedom,
-    )  # fmt: skip
-    for source, shifts in parts.items():
-        one = shifted_by(one, source, None if shifts is None else float(shifts[index]))
-    return one

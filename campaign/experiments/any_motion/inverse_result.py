@@ -19,7 +19,13 @@ from campaign.estimation.gate import admitted_together, refused
 from campaign.estimation.inverse.presliding_share import HARDLY_SLIDES
 from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.any_motion.figures import figures
-from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find, repeats
+from campaign.experiments.any_motion.inverse_fit import (
+    BENDS,
+    PRESLIDING,
+    InverseDynamics,
+    find,
+    repeats,
+)
 from campaign.experiments.any_motion.motions import force_of, read, with_constants, with_slowest
 from campaign.experiments.any_motion.tables import (
     correlated,
@@ -234,6 +240,11 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
         yield f"No instruments along the wanted motion: {found.no_instruments}."
     if found.biased:
         yield instruments_note(found)
+    if found.bristles is not None and not found.biased:
+        yield (
+            "The axis hardly slides: the inertia is that of a fit with bristles in place of dry "
+            f"friction. Its difference to the chosen model is the systematic part {PRESLIDING!r}."
+        )
     if any(each.reason in BENDS for each in found.estimates.values()):
         yield (
             "A term that is nonlinear in the rate was added because it predicts better. It "

@@ -43,7 +43,7 @@ from campaign.experiments.interface import (
 )
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.captions import trials_of
-from campaign.experiments.shared.common import conditions, grouped, joined, suffixes
+from campaign.experiments.shared.common import conditions, grouped, numbered
 from campaign.experiments.shared.detected_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
@@ -350,7 +350,7 @@ def _by_torque_constant(estimate: Estimate, bench: Bench) -> Estimate:
 def _analyse(data: TestData) -> Result:
     places = [_ramps(group) for group in grouped(data.completed(), own=OF_A_RAMP).values()]
     groups = [compared(ramps, places) for ramps in places]
-    whole = joined(map(_of_ramps, groups, suffixes(len(groups))))
+    whole = numbered(map(_of_ramps, groups))
     if data.model is None:
         return whole
     notes = list(whole.notes)
@@ -366,28 +366,26 @@ def _ramps(group: tuple[TrialData, ...]) -> Ramps:
     )
 
 
-def _of_ramps(ramps: Ramps, suffix: str) -> Result:
+def _of_ramps(ramps: Ramps) -> Result:
     """Result of the ramps of one sweep point."""
     means = means_of(ramps)
     return Result(
-        (table_of(ramps, means, suffix), *window_table(ramps, suffix)),
-        tuple(_figures(ramps, means, suffix)),
+        (table_of(ramps, means), *window_table(ramps)),
+        tuple(_figures(ramps, means)),
         tuple(findings_of(ramps, means)),
         tuple(remarks(ramps)),
     )
 
 
-def _figures(
-    ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
-) -> Iterator[Figure]:
+def _figures(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]]) -> Iterator[Figure]:
     drawn = (k for k, data in enumerate(ramps.trials) if not data.not_kept)
     shown = next((k for k in drawn if "bristle_stiffness" in ramps.found[k]), None)
     if shown is not None:
         data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
         curve, place = curve_of(data, torque), ramps.places[shown]
-        yield ramp_figure(_samples(data), curve, torque, suffix, place, trials_of([data]))
+        yield ramp_figure(_samples(data), curve, torque, place, trials_of([data]))
     if len(ramps.found) > 2 and all("position" in place for place in ramps.places):
-        yield position_figure(ramps, means, suffix)
+        yield position_figure(ramps, means)
 
 
 EXPERIMENT = Experiment(

@@ -31,7 +31,6 @@ def ramp_figure(
     samples: tuple[Array, Array, Array],
     found: Presliding,
     breakaway: float,
-    suffix: str,
     place: Mapping[str, Value],
     trials: tuple[int, ...],
 ) -> Figure:
@@ -40,7 +39,7 @@ def ramp_figure(
     axis = Axis("Time", "s", "s")
     low, high = found.window
     return Figure(
-        key=f"ramp{suffix}",
+        key="ramp",
         title="Breakaway: torque ramp, motion, and the presliding curve",
         caption=f"One ramp, {_where(place)}. The torque rises until the load slides, at "
         f"{amount(breakaway, 'N m')}. {_gives(found)} The angle is the gyro's rate, integrated "
@@ -163,9 +162,7 @@ def _residual_panel(
     )
 
 
-def position_figure(
-    ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
-) -> Figure:
+def position_figure(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]]) -> Figure:
     """Breakaway torque and stiffness over position, with intervals of the ramps, and means."""
     shown = {"breakaway_torque": "breakaway torque", "bristle_stiffness": "bristle stiffness"}
     sentences = [_what_shows(ramps.values(name), word, len(shown)) for name, word in shown.items()]
@@ -176,7 +173,7 @@ def position_figure(
         for name, axis in zip(shown, axes, strict=True)
     ]
     return Figure(
-        key=f"positions{suffix}",
+        key="positions",
         title="Breakaway torque and bristle stiffness over position",
         caption=f"{' '.join(filter(None, sentences))} {_bars(ramps)}",
         alt="Breakaway torque and bristle stiffness, one dot with a bar per ramp, and their mean.",

@@ -89,7 +89,7 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     value = float(np.mean([each.value for each in found]))
     unit, count = found[0].unit, len(found)
     systematic = shared_parts(found)
-    base = next((each for each in found if _bound(each) or _assumed(each)), None)
+    base = next((each for each in found if each.is_bound or _assumed(each)), None)
     if base is not None:
         lacking = next((each for each in found if math.isnan(_end(each, base))), None)
         if lacking is not None:
@@ -114,7 +114,7 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     method = f"mean of {count} ramps, Student's t"
     scatter = with_error(quantity, value, unit, outer, count - 1, method, systematic=systematic)
     within = with_error(quantity, value, unit, inner, inner_freedom, method, systematic=systematic)
-    widest = max((scatter, within), key=_width)
+    widest = max((scatter, within), key=lambda each: each.half_width if each.has_interval else 0.0)
     return _as_assumed(widest, found[0]) if rule else admitted(widest)
 
 
@@ -128,27 +128,21 @@ def _assumed(estimate: Estimate) -> bool:
     return estimate.origin is Origin.ASSUMED and not estimate.has_interval
 
 
-def _bound(estimate: Estimate) -> bool:
-    return estimate.kind in ("at least", "at most")
-
-
 def _end(estimate: Estimate, told: Estimate) -> float:
     """Contribution to a mean with bounds like `told`: the end on that side, or NaN without one."""
-    if not _bound(told) or estimate.kind == told.kind:
+    if not told.is_bound or estimate.kind == told.kind:
         return estimate.value
     end = estimate.low if told.kind == "at least" else estimate.high
     return math.nan if end is None else end
 
 
-def _width(estimate: Estimate) -> float:
-    return 0.0 if not estimate.has_interval else estimate.half_width
-
-
 def _between(one: Estimate, other: Estimate) -> Estimate:
     """Mean of the means of two directions with independent ramps."""
     systematic = shared_parts((one, other))
-    base = next((each for each in (one, other) if not each.has_interval and not _bound(each)), None)
-    base = base or next((each for each in (one, other) if _bound(each)), None)
+    base = next(
+        (each for each in (one, other) if not each.has_interval and not each.is_bound), None
+    )
+    base = base or next((each for each in (one, other) if each.is_bound), None)
     if base is not None:
         value = 0.5 * (_end(one, base) + _end(other, base))
         more = {"origin": base.origin, "kind": base.kind, "method": base.method}

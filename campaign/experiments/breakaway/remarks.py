@@ -86,7 +86,7 @@ def _rate(ramps: Ramps) -> Iterator[str]:
         name
         for name in MEASURED
         if any(each.reason and each.standard_error is not None for each in ramps.values(name))
-        and not any(each.kind in ("at least", "at most") for each in ramps.values(name))
+        and not any(each.is_bound for each in ramps.values(name))
     ]
     stiffness = ramps.values("bristle_stiffness")
     shifted = sum(_by_window(each) > 0.5 * _scatter(each) > 0 for each in stiffness)

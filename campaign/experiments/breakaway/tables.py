@@ -47,7 +47,7 @@ def chord_of(value: float) -> Estimate:
     return Estimate.without_interval("chord", value, "N m/rad", CHORD())
 
 
-def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str) -> Table:
+def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]]) -> Table:
     """Table 4.5: one row for each ramp, then the means."""
     rows: list[dict[str, Cell]] = [
         {
@@ -70,7 +70,7 @@ def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: 
             }
         )
     return Table(
-        key=f"presliding{suffix}",
+        key="presliding",
         title="Breakaway torque and presliding parameters by position",
         columns=(
             Column("measurement", "Measurement", exact=True),
@@ -91,7 +91,7 @@ def table_of(ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: 
     )
 
 
-def window_table(ramps: Ramps, suffix: str) -> Iterator[Table]:
+def window_table(ramps: Ramps) -> Iterator[Table]:
     """Dependence of sigma0 on the end of the fitted window; no table if no ramp has a curve."""
     names = dict.fromkeys(name for own in ramps.found for name in own if name.startswith(SHARE))
     shares = {float(name.removeprefix(SHARE)): name for name in names}
@@ -110,7 +110,7 @@ def window_table(ramps: Ramps, suffix: str) -> Iterator[Table]:
     if not rows:
         return
     yield Table(
-        key=f"window{suffix}",
+        key="window",
         title="Effect of the fitted window on σ0",
         columns=(
             Column("share", "Fitted up to (share of breakaway)", exact=True),

@@ -185,11 +185,11 @@ def _analyse(data: TestData) -> Result:
     trials = (*data.left_out, *(item.trial for item in data.trials))
     planned = {str(trial.point["component"]) for trial in trials}
 
-    def of_place(group: Sequence[TrialData], suffix: str) -> Result:
+    def of_place(group: Sequence[TrialData]) -> Result:
         readings = [_read(item) for item in group]
         return Result(
-            (_table(readings, suffix),),
-            (_figure(readings, suffix),),
+            (_table(readings),),
+            (_figure(readings),),
             tuple(_findings(readings, planned)),
             tuple(_remarks(readings, group[0])),
         )
@@ -244,7 +244,7 @@ def _side(reading: Reading) -> str:
     return str(bench_of(reading.data.trial).friction[reading.component].side)
 
 
-def _figure(readings: list[Reading], suffix: str) -> Figure:
+def _figure(readings: list[Reading]) -> Figure:
     shown = [
         ComponentCurves(
             name,
@@ -259,10 +259,10 @@ def _figure(readings: list[Reading], suffix: str) -> Figure:
     options = validated(ComponentFrictionOptions, readings[0].data.trial.options)
     shared = {k: v for k, v in readings[0].place.items() if k not in OWN}
     trials = trials_of(reading.data for reading in readings)
-    return component_figure(shown, shared, options.sliding_rate, trials, suffix)
+    return component_figure(shown, shared, options.sliding_rate, trials)
 
 
-def _table(readings: list[Reading], suffix: str) -> Table:
+def _table(readings: list[Reading]) -> Table:
     components = _by_component(readings)
     rows: list[dict[str, Cell]] = []
     for number in sorted({reading.measurement for reading in readings}):
@@ -276,7 +276,7 @@ def _table(readings: list[Reading], suffix: str) -> Table:
     if len(components) > 1:
         rows[-2]["sum"] = total_of({name: values["mean"] for name, values in statistics.items()})
     return Table(
-        key=f"component-friction{suffix}",
+        key="component-friction",
         title="Breakaway torque of each component, seen at the load",
         columns=(
             Column("measurement", "Measurement", exact=True),

@@ -46,13 +46,12 @@ def component_figure(
     place: Mapping[str, Value],
     sliding_rate: float,
     trials: tuple[int, ...],
-    suffix: str,
 ) -> Figure:
     """The figure of one place of the sweep; sliding_rate (rad/s) counts as sliding."""
     last = max(number for each in shown for number in each.numbers)
     ramps = [_ramp(each) for each in shown if not each.ramp.not_kept]
     return Figure(
-        key=f"component-friction{suffix}",
+        key="component-friction",
         title="Breakaway torque of the components",
         caption=f"{'One ramp of each component until it slides, then the' if ramps else 'The'} "
         "repeated readings of each component, with their 95 % intervals, and their mean, each "

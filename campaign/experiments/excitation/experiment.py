@@ -29,8 +29,8 @@ from campaign.experiments.interface import (
     metrics,
 )
 from campaign.experiments.responses.figures import coherence_figure, response_figures
-from campaign.experiments.responses.signals import STEADY, usable
-from campaign.experiments.responses.sources import Reading, sources
+from campaign.experiments.responses.signals import STEADY, ResponseOptions, usable
+from campaign.experiments.responses.sources import sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
 from campaign.experiments.shared.common import conditions, joined, of_each_place
 from campaign.experiments.shared.default_options import NO_ROOM, torque_above_friction, usual
@@ -42,7 +42,6 @@ from campaign.trial import Task, TrialRequest
 
 OWN = ("realisation",)
 """Conditions in which the trials of one group differ."""
-READING = Reading("auto", "H1", None, None)
 SWING = 0.7
 """Share of the angle limit that the default options of a rate command may use."""
 FAVARD = 0.5 * math.pi
@@ -134,9 +133,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 def _analyse(data: TestData) -> Result:
     known = list(data.completed())
     accounts = [(item, metrics(item, _measure)) for item in known]
-    commands = of_each_place(
-        known, OWN, lambda group, suffix: Result(figures=(command_figure(group, suffix),))
-    )
+    commands = of_each_place(known, OWN, lambda group: Result(figures=(command_figure(group),)))
     shaken = [each for each in known if options_of(each.trial).signal != "fourier"]
     results = joined((_responses(shaken), of_each_place(known, OWN, partial(_of_series, data))))
     whole = joined((Result(tuple(reached_tables(accounts))), commands, results))
@@ -150,7 +147,7 @@ def _responses(trials: Sequence[TrialData]) -> Result:
     own, why = usable(trials)
     if not own:
         return Result(notes=(f"{why}.",))
-    responses, remarks = sources(own, bench_of(own[0].trial), READING)
+    responses, remarks = sources(own, bench_of(own[0].trial), ResponseOptions())
     if not responses:
         return Result(notes=tuple(remarks))
     responses.sort(key=lambda each: each.trials)
@@ -173,7 +170,7 @@ def _responses(trials: Sequence[TrialData]) -> Result:
     )
 
 
-def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
+def _of_series(data: TestData, group: Sequence[TrialData]) -> Result:
     """Inverse dynamics of one sweep point, with the terms for which the series is designed."""
     options = options_of(group[0].trial)
     if options.signal != "fourier":
@@ -185,15 +182,8 @@ def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Resul
     except ValueError as error:
         return Result(notes=(f"{group[0].trial.label}: {error}.",))
     findings = tuple(replace(each, conditions=place) for each in inverse.findings)
-    return Result(
-        tuple(replace(each, key=f"{each.key}{suffix}") for each in inverse.tables),
-        (
-            *(replace(each, key=f"{each.key}{suffix}") for each in inverse.figures),
-            plane_figure(group, suffix),
-        ),
-        findings,
-        inverse.notes,
-    )
+    figures = (*inverse.figures, plane_figure(group))
+    return Result(inverse.tables, figures, findings, inverse.notes)
 
 
 EXPERIMENT = Experiment(

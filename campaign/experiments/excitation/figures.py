@@ -31,7 +31,7 @@ FLOOR = -80.0
 """dB; lower levels are not drawn."""
 
 
-def command_figure(group: Sequence[TrialData], suffix: str) -> Figure:
+def command_figure(group: Sequence[TrialData]) -> Figure:
     """Course and spectrum of the command of the first trial, and of the reached motion."""
     data = group[0]
     trial, recording = data.trial, data.recording()
@@ -54,7 +54,7 @@ def command_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     ]
     several = " Of several trials the first is drawn." if len(group) > 1 else ""
     return Figure(
-        key=f"command{suffix}",
+        key="command",
         title="Command and response",
         caption=f"Left, {part}; right, where in frequency the command has its power, and what came "
         f"of it there, both over the largest of the command.{several}",
@@ -97,7 +97,7 @@ def _filled(samples: Array) -> Array:
     return np.asarray(np.nan_to_num(samples))
 
 
-def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
+def plane_figure(group: Sequence[TrialData]) -> Figure:
     """Path of a series in angle and rate, requested and reached."""
     data = group[0]
     moved, task = motion_of(data), data.trial.task
@@ -106,7 +106,7 @@ def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     command = cast("MultiSine", task.command)
     angle = command.integral(time, 1) - command.integral(np.zeros(1), 1) + task.start_angle
     return Figure(
-        key=f"plane{suffix}",
+        key="plane",
         title="Path of the series",
         caption="Rate over angle of one period, setpoint and measured. Friction is determined at "
         "the rates of the path, torques that depend on position at its angles.",

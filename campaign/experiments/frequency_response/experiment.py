@@ -48,7 +48,7 @@ from campaign.experiments.interface import (
 )
 from campaign.experiments.responses.signals import STEADY, steady_window
 from campaign.experiments.shared import default_options
-from campaign.experiments.shared.common import conditions, grouped, method_label, swept
+from campaign.experiments.shared.common import conditions, grouped, method_label, number_of, swept
 from campaign.experiments.shared.detected_trials import sine_response
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.swept_words import words
@@ -72,6 +72,7 @@ from campaign.units import (
     torque_text,
 )
 
+FREQUENCY = "frequency"
 AT_HAND = Cause("describes the recording at hand", "it describes the recording at hand")
 NYQUIST_SHARE = 0.4
 """Highest measurable frequency over the controller's sample rate."""
@@ -163,7 +164,7 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
             sample_rate=rate,
             start_angle=options.position - swing,
         ),
-        point={"frequency": frequency},
+        point={FREQUENCY: frequency},
         note=f"{options.cycles} cycles after {settle} to settle; amplitude {size}",
         requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
         windows=(Window(STEADY, start, stop),),
@@ -240,9 +241,10 @@ def _sample_rate(options: FrequencyResponseOptions, bench: Bench, frequency: flo
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """Response to one sine: its real and imaginary part, and the coherence."""
     task, window = data.trial.task, steady_window(data.trial)
+    frequency = number_of(data.trial, FREQUENCY)
     recording = data.recording().window(window.start, window.stop)
     drive = recording[_excitation(task.mode)]
-    point = sine_point(recording.time, drive, recording[GYRO_RATE], _frequency(data))
+    point = sine_point(recording.time, drive, recording[GYRO_RATE], frequency)
     unit = "" if task.mode == "rate" else TORQUE_TO_RATE
     method = "least squares over whole cycles"
     parts = (("response_real", point.response.real), ("response_imag", point.response.imag))
@@ -257,36 +259,29 @@ COUNTS = 3.0
 TORQUE_TO_RATE = "rad/s/(N m)"
 
 
-def _frequency(data: TrialData) -> float:
-    return float(str(data.trial.point["frequency"]))
-
-
 def _point(data: TrialData) -> SinePoint:
     """Sine of a trial, from its metrics. Raises ValueError if there is none."""
     values = metrics(data, _measure)
     real, imaginary = values["response_real"], values["response_imag"]
     if not math.isfinite(real.value + imaginary.value):
         raise ValueError("its signals have no numbers")
-    task, size = data.trial.task, abs(complex(real.value, imaginary.value))
+    task, frequency = data.trial.task, number_of(data.trial, FREQUENCY)
+    response = complex(real.value, imaginary.value)
     if isinstance(task.command, Sine) and not data.trial.recording:
-        count = Rig(bench_of(data.trial)).rate_count(2.0 * math.pi * _frequency(data))
-        if not size * task.command.amplitude > COUNTS * count:
+        count = Rig(bench_of(data.trial)).rate_count(2.0 * math.pi * frequency)
+        if not abs(response) * task.command.amplitude > COUNTS * count:
             raise ValueError(f"its response is below {COUNTS:g} counts of the rate's sensor")
-    return SinePoint(
-        _frequency(data),
-        complex(real.value, imaginary.value),
-        real.standard_error or 0.0,
-        values["coherence"].value,
-    )
+    error = real.standard_error or 0.0
+    return SinePoint(frequency, response, error, values["coherence"].value)
 
 
 def _analyse(data: TestData) -> Result:
     if data.model is not None:
         return identified(data)
     notes: list[str] = []
-    paths = [path for path in swept(data, own=("frequency",)) if path != "loop"]
+    paths = [path for path in swept(data, own=(FREQUENCY,)) if path != "loop"]
     sweeps: list[Sweep] = []
-    for group in grouped(data.completed(), own=("frequency",)).values():
+    for group in grouped(data.completed(), own=(FREQUENCY,)).values():
         points = []
         for item in group:
             try:
@@ -321,11 +316,11 @@ def _analyse(data: TestData) -> Result:
 
 def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
     place = conditions(first, "compensation", "loop")
-    place.pop("frequency", None)
+    place.pop(FREQUENCY, None)
     loop = "closed" if first.trial.task.mode == "rate" else "open"
     label = method_label(str(place["compensation"]))
     swept = {path: place.get(path) for path in paths if path != "compensation"}
-    others = words(swept, first.trial, FrequencyResponseOptions)
+    others = words(swept, first.trial)
     servo = characteristics(response) if loop == "closed" else None
     return Sweep(place, loop, ", ".join([label, *others]), response, servo)
 

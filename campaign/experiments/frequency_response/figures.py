@@ -10,7 +10,7 @@ import numpy as np
 from campaign.estimation.continuation import DECIBEL, Continuation
 from campaign.estimation.frequency_response import Response, open_loop
 from campaign.estimation.servo import ServoCharacteristics
-from campaign.experiments.frequency_response.marks import Named, bandwidths, margins
+from campaign.experiments.frequency_response.marks import BodeContent, Named, bandwidths, margins
 from campaign.experiments.responses.figures import FREQUENCY, PHASE, gain_label, turned
 from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
 
@@ -49,9 +49,8 @@ def closed_loop_figures(
         "Gain and phase of the closed loop over frequency, one curve per compensation.",
         Axis("Gain", "dB"),
         named,
-        thesis=_chosen(("5.5", modelled), ("5.19", observed)),
-        level_marks=(Mark("-3 dB", y=-3.0), *widths.gain_marks),
-        more_gain=widths.gain,
+        _chosen(("5.5", modelled), ("5.19", observed)),
+        replace(widths, gain_marks=[Mark("-3 dB", y=-3.0), *widths.gain_marks]),
     )
     loops = [(label, series, open_loop(r)) for label, series, r in named]
     kept = margins(loops, [turned(r.phase) for _, _, r in loops], found, names)
@@ -73,18 +72,20 @@ def closed_loop_figures(
         "0 dB and -180° lines and the margins.",
         Axis("Gain", "dB"),
         loops,
-        thesis=_chosen(("5.6", modelled), ("5.20", observed)),
-        level_marks=(Mark("0 dB", y=0.0), *kept.gain_marks),
-        phase_marks=(Mark("-180°", y=-np.pi), *kept.phase_marks),
-        more_gain=[*(level for level, _ in beyond), *kept.gain],
-        more_phase=[*(phase for _, phase in beyond), *kept.phase],
+        _chosen(("5.6", modelled), ("5.20", observed)),
+        BodeContent(
+            [*(level for level, _ in beyond), *kept.gain],
+            [*(phase for _, phase in beyond), *kept.phase],
+            [Mark("0 dB", y=0.0), *kept.gain_marks],
+            [Mark("-180°", y=-np.pi), *kept.phase_marks],
+        ),
     )
 
 
 def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
     """Figure 4.5: drive torque to gyro rate, and the apparent inertia."""
     named = _distinct(sweeps)
-    resonances = tuple(Mark(f"{mode.value:.3g} Hz", x=mode.value) for mode in modes)[:1]
+    resonances = [Mark(f"{mode.value:.3g} Hz", x=mode.value) for mode in modes][:1]
     bode = _bode(
         "torque-to-rate",
         "Open-loop response, drive torque to gyro rate",
@@ -94,9 +95,8 @@ def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
         "Gain and phase from drive torque to gyro rate over frequency, and the apparent inertia.",
         Axis(gain_label("Gain")),
         named,
-        thesis=("4.5",),
-        level_marks=resonances,
-        phase_marks=resonances,
+        ("4.5",),
+        BodeContent(gain_marks=resonances, phase_marks=resonances),
     )
     inertia = Panel(
         FREQUENCY,
@@ -165,14 +165,11 @@ def _bode(
     gain: Axis,
     named: Sequence[Named],
     thesis: tuple[str, ...],
-    level_marks: tuple[Mark, ...] = (),
-    phase_marks: tuple[Mark, ...] = (),
-    more_gain: Sequence[Curve] = (),
-    more_phase: Sequence[Curve] = (),
+    more: BodeContent,
 ) -> Figure:
     curves = [(label, series, r, r.level, turned(r.phase)) for label, series, r in named]
     less = list(_differences(curves))
-    every = [curve.x for curve in more_gain] + [r.frequency for _, _, r, _, _ in curves]
+    every = [curve.x for curve in more.gain] + [r.frequency for _, _, r, _, _ in curves]
     across = _range(np.concatenate(every)) if less else FREQUENCY
     below = " (c, d) What compensation changes, less the response without." if less else ""
     return Figure(
@@ -185,15 +182,15 @@ def _bode(
                 across,
                 gain,
                 [_with_interval(r, level, label, s, DECIBEL) for label, s, r, level, _ in curves]
-                + list(more_gain),
-                marks=level_marks,
+                + more.gain,
+                marks=more.gain_marks,
             ),
             Panel(
                 across,
                 PHASE,
                 [_with_interval(r, phase, label, s, 1.0) for label, s, r, _, phase in curves]
-                + list(more_phase),
-                marks=phase_marks,
+                + more.phase,
+                marks=more.phase_marks,
             ),
             *(replace(panel, x=across) for panel in less),
         ),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Estimate
 from campaign.estimation.frequency_response import Response
 from campaign.estimation.servo import Crossing, ServoCharacteristics
 from campaign.experiments.frequency_response.tables import QUANTITIES, Sweep, method
@@ -49,10 +49,11 @@ def bandwidths(sweeps: Sequence[Named], found: Found, names: Sequence[str]) -> B
         width = read.bandwidth
         if width.kind != "number":
             if math.isfinite(width.value):
-                label = f"{name} {_sign(width)} {width.value:.3g} Hz"
+                sign = "≥" if width.kind == "at least" else "≤"
+                label = f"{name} {sign} {width.value:.3g} Hz"
                 drawn.gain_marks.append(Mark(label, x=width.value, series=series))
             continue
-        if not _known(width):
+        if not width.is_determined:
             continue
         low, high = width.combined
         if low is not None and high is not None:
@@ -74,13 +75,13 @@ def margins(
     for (_, series, loop), shown, read, name in zip(loops, phases, found, names, strict=True):
         if read is None:
             continue
-        if _known(read.phase_margin) and (at := read.crossing(read.phase_margin)) is not None:
+        if read.phase_margin.is_determined and (at := read.crossing(read.phase_margin)) is not None:
             _phase_margin(drawn, at, loop, shown, series, _name(name, len(loops)))
         gain = read.gain_margin
         if gain.kind == "at least":
             label = f"{_name(name, len(loops))}gain margin ≥ {gain.value:.3g} dB".strip()
             drawn.gain_marks.append(Mark(label, y=-gain.value, series=series))
-        elif _known(gain) and (at := read.crossing(gain)) is not None:
+        elif gain.is_determined and (at := read.crossing(gain)) is not None:
             _gain_margin(drawn, at, series, _name(name, len(loops)))
     return drawn
 
@@ -119,14 +120,6 @@ def _dot(frequency: float, base: float, margin: Estimate, sign: float, series: s
     y = np.array([base + sign * margin.value])
     low, high = (np.array([end]) for end in reach)
     return Curve(np.array([frequency]), y, "", series, "points", low=low, high=high)
-
-
-def _known(estimate: Estimate) -> bool:
-    return math.isfinite(estimate.value) and estimate.origin is not Origin.NOT_DETERMINED
-
-
-def _sign(estimate: Estimate) -> str:
-    return {"at least": "≥", "at most": "≤"}.get(estimate.kind, "")
 
 
 def _name(name: str, count: int) -> str:
@@ -196,7 +189,7 @@ def _bound(place: int, sweep: Sweep, found: Estimate) -> Iterator[Mark]:
     """Word beside a dot that is a bound, or not determined."""
     if found.kind != "number":
         word: str = found.kind
-    elif not _known(found):
+    elif not found.is_determined:
         word = "not determined"
     else:
         return

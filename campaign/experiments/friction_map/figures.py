@@ -34,7 +34,7 @@ FINE = 160
 """Points of a fitted curve."""
 
 
-def map_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
+def map_figure(fits: Curves, where: str, trials: tuple[int, ...]) -> Figure:
     """Both directions: points and fits with their intervals, over rate and over its logarithm."""
     whole: list[Curve] = []
     own: dict[str, list[Curve]] = {}
@@ -45,7 +45,7 @@ def map_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
         own[name] = [bars, _law(_fitted(fits, name, name), name)]
     marks = _least_marks(fits)
     return Figure(
-        key=f"map{suffix}",
+        key="map",
         title=f"Friction-velocity map{f' ({where})' if where else ''}",
         caption=f"{_what_shows(fits)} (a) Both directions with their signs, (b) each in its "
         "own sign over the logarithm of speed. Lines: Equation 4.6 fitted with δ "
@@ -162,7 +162,7 @@ def _rises(fits: Curves, name: str) -> bool:
     return surely_above(fits.estimates("free")[name]["viscous_friction"], 0.0, seen)
 
 
-def fit_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
+def fit_figure(fits: Curves, where: str, trials: tuple[int, ...]) -> Figure:
     """Points and fitted curves of each direction over the logarithm of speed, and residuals."""
     curves, residuals = [], []
     for name, fit in fits.fits.items():
@@ -176,7 +176,7 @@ def fit_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
         )
         residuals.append(_residual_panel(fit, name))
     return Figure(
-        key=f"fit{suffix}",
+        key="fit",
         title=f"Stribeck curve fitted to the map{f' ({where})' if where else ''}",
         caption="Equation 4.6 fitted by least squares, (a, b) with δ free and with δ = 2; (c, d) "
         "residuals of the fit with δ free, on a scale of their own. "
@@ -223,11 +223,11 @@ def _misfit(fits: Mapping[str, DirectionFit]) -> str:
     return sentence(f"{start} {listed(words)} those with δ free")
 
 
-def rate_figure(curves: Curves, suffix: str = "") -> Figure:
+def rate_figure(curves: Curves) -> Figure:
     """One quantity over rate."""
     what = curves.quantity.axis[0]
     return Figure(
-        key=f"{'map' if curves.quantity is FRICTION else 'coefficient'}{suffix}",
+        key="map" if curves.quantity is FRICTION else "coefficient",
         title=f"{what} over rate",
         caption=rate_caption(curves),
         alt=f"{what} over rate in both directions: a dot for each point, and curves.",
@@ -309,7 +309,9 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
         near.append(Curve(ends, np.full(2, level), "mean", "fit"))
     mean_text = "" if level is None else f", {amount(level, 'N m')} here,"
     above = _cut_above(whole, level)
-    start = "" if above is None else _cut_words(whole)
+    start = ""
+    if above is not None:
+        start = f"The peak of {amount(float(np.nanmax(whole)), 'N m')} at the start is cut off. "
     return (
         Figure(
             key="one-point",
@@ -335,10 +337,6 @@ def _cut_above(torque: Array, level: float | None) -> tuple[float, float] | None
     if level is None or level <= 0 or not np.nanmax(torque) > TALLEST * level:
         return None
     return -np.inf, HEADROOM * level
-
-
-def _cut_words(torque: Array) -> str:
-    return f"The peak of {amount(float(np.nanmax(torque)), 'N m')} at the start is cut off. "
 
 
 def _mean(values: Array) -> float | None:

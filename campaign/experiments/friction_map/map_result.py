@@ -37,7 +37,7 @@ from campaign.reason import Reason
 from campaign.result import Finding, Result
 
 
-def one_map(group: Sequence[TrialData], suffix: str = "") -> tuple[Result, Curves]:
+def one_map(group: Sequence[TrialData]) -> tuple[Result, Curves]:
     """Result and curves of the map from runs at one place of a test's matrix."""
     place = {k: v for k, v in group[0].trial.point.items() if k not in OWN}
     conditions = {k: v for k, v in place.items() if isinstance(v, str | int | float | bool)}
@@ -45,21 +45,21 @@ def one_map(group: Sequence[TrialData], suffix: str = "") -> tuple[Result, Curve
     notes: list[str] = []
     kept, left = steady(points_of(settled_enough(group, notes), notes), notes)
     fits = fit_curves(kept, group[0])
-    points = point_table((*fits.points, *left), group[0], suffix, where)
+    points = point_table((*fits.points, *left), group[0], where)
     if not fits.is_map:
         notes += (f"{where}: {note}" if where else note for note in fits.notes)
         estimates = by_direction(parameters_of(fits)) if fits.points else {}
         result = Result(
             (points,),
-            (rate_figure(fits, suffix),) if estimates else (),
+            (rate_figure(fits),) if estimates else (),
             tuple(curve_findings(estimates, conditions)),
             tuple(notes),
         )
         return result, fits
     shown = trials_of(group)
     result = Result(
-        (parameter_table(fits, suffix, where), model_table(fits, suffix, where), points),
-        (map_figure(fits, suffix, where, shown), fit_figure(fits, suffix, where, shown)),
+        (parameter_table(fits, where), model_table(fits, where), points),
+        (map_figure(fits, where, shown), fit_figure(fits, where, shown)),
         tuple(map_findings(fits, conditions)),
         (*notes, *map_notes(fits, where)),
     )

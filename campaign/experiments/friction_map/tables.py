@@ -54,9 +54,7 @@ def curve_findings(
             yield Finding.of(known, {**place, "direction": direction})
 
 
-def point_table(
-    points: Sequence[Point], first: TrialData, suffix: str = "", where: str = ""
-) -> Table:
+def point_table(points: Sequence[Point], first: TrialData, where: str = "") -> Table:
     """The points of runs by speed, or stretches in order of time; those left out among them.
 
     first: one of the trials.
@@ -91,7 +89,7 @@ def point_table(
     kept = {column.name for column in shown}
     of = "Points of the friction-velocity map" if runs else "Steady stretches"
     return Table(
-        key=f"{'map' if runs else 'steady-stretches'}{suffix}",
+        key="map" if runs else "steady-stretches",
         title=f"{of}{f' ({where})' if where else ''}",
         columns=shown,
         rows=tuple({name: cell for name, cell in row.items() if name in kept} for row in rows),
@@ -130,7 +128,7 @@ def _point_row(number: int, point: Point, first: TrialData) -> dict[str, Cell]:
     return row
 
 
-def parameter_table(fits: Curves, suffix: str, where: str) -> Table:
+def parameter_table(fits: Curves, where: str) -> Table:
     """Table 4.3: parameters by direction, δ free and δ = 2."""
     free, fixed = fits.estimates("free"), fits.estimates("2")
     rows: list[dict[str, Cell]] = []
@@ -145,7 +143,7 @@ def parameter_table(fits: Curves, suffix: str, where: str) -> Table:
     for name, fit in fits.fits.items():
         rms |= {name: _rms(fit, "free"), f"{name}_exponent_2": _rms(fit, "2")}
     return Table(
-        key=f"parameters{suffix}",
+        key="parameters",
         title=f"Static friction parameters{f' ({where})' if where else ''}",
         columns=(
             Column("parameter", "Parameter"),
@@ -170,7 +168,7 @@ def _rms(fit: DirectionFit, model: Model) -> Estimate:
     return Estimate.without_interval("residual", fit.fits[model].rms, "N m", OF_RESIDUALS())
 
 
-def model_table(fits: Curves, suffix: str, where: str) -> Table:
+def model_table(fits: Curves, where: str) -> Table:
     """How well each model of the Stribeck effect describes the points of each direction."""
     rows: list[dict[str, Cell]] = [
         {
@@ -187,7 +185,7 @@ def model_table(fits: Curves, suffix: str, where: str) -> Table:
         for model in MODELS
     ]
     return Table(
-        key=f"models{suffix}",
+        key="models",
         title=f"Models of the Stribeck effect{f' ({where})' if where else ''}",
         columns=(
             Column("direction", "Direction"),

@@ -31,8 +31,8 @@ from campaign.experiments.shared.common import (
     compensation_of,
     conditions,
     grouped,
+    numbered,
     parameter_paths,
-    suffixes,
     with_changes,
 )
 from campaign.experiments.shared.friction_models import (
@@ -45,7 +45,7 @@ from campaign.experiments.shared.friction_models import (
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
-from campaign.result import Array, Cell, Column, Figure, Finding, Result, Table
+from campaign.result import Array, Cell, Column, Finding, Result, Table
 from campaign.signals import Sine
 from campaign.trial import Task, Tree, TrialRequest
 from campaign.units import AngularRate, Frequency
@@ -147,14 +147,12 @@ def _analyse(data: TestData) -> Result:
     if not rows:
         return Result()
     options = validated(ModelOutputOptions, measured[0].trial.options)
-    figures: list[Figure] = []
-    for place, suffix in zip(plain, suffixes(len(plain)), strict=True):
-        figures += [
-            static_figure(place.trials[0], suffix, options.amplitude),
-            sine_figure(place.trials, suffix),
-        ]
-    for place, suffix in zip(varied, suffixes(len(varied)), strict=True):
-        figures += variation_figures(place.trials, suffix)
+    top = options.amplitude
+    shown = [
+        Result(figures=(static_figure(p.trials[0], top), sine_figure(p.trials))) for p in plain
+    ]
+    variations = [Result(figures=tuple(variation_figures(place.trials))) for place in varied]
+    figures = (*numbered(shown).figures, *numbered(variations).figures)
     table = Table(
         key="model-output",
         title="Output of the models at a sinusoidal rate",
@@ -171,7 +169,7 @@ def _analyse(data: TestData) -> Result:
     )
     return Result(
         (table,),
-        tuple(figures),
+        figures,
         tuple(findings),
         telling=next((figure.key for figure in figures if figure.key.startswith("sine")), ""),
     )

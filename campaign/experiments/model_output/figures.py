@@ -8,7 +8,7 @@ import numpy as np
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.experiments.interface import TrialData, bench_of
-from campaign.experiments.shared.common import closed, method_label
+from campaign.experiments.shared.common import closed, method_label, number_of
 from campaign.experiments.shared.friction_models import PARAMETER_LABELS, model_label, model_series
 from campaign.physics.steady_friction import steady_friction
 from campaign.recording import Recording
@@ -50,7 +50,7 @@ def _symbol(parameter: str) -> str:
     return PARAMETER_LABELS.get(parameter, parameter.replace("_", " "))
 
 
-def static_figure(data: TrialData, suffix: str, amplitude: float) -> Figure:
+def static_figure(data: TrialData, amplitude: float) -> Figure:
     """Friction of steady sliding and its parts, up to an amplitude of the rate (rad/s)."""
     bench = bench_of(data.trial)
     half = np.geomspace(1e-5 * amplitude, amplitude, 400)
@@ -58,7 +58,7 @@ def static_figure(data: TrialData, suffix: str, amplitude: float) -> Figure:
     dry, viscous = steady_friction(bench, rate)
     gap = np.where(np.arange(len(rate)) == len(half), np.nan, 1.0)  # no line through the jump
     return Figure(
-        key=f"static-curve{suffix}",
+        key="static-curve",
         title="Friction of steady sliding and its parts",
         caption="The Stribeck part s(v) falls from static to Coulomb friction, the viscous part "
         "rises with the rate; their sum is the torque of every model at a constant rate.",
@@ -79,7 +79,7 @@ def static_figure(data: TrialData, suffix: str, amplitude: float) -> Figure:
     )
 
 
-def sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
+def sine_figure(trials: Sequence[TrialData]) -> Figure:
     """Torque over a cycle of the rate, for each model."""
     compensated = any("compensation" in item.trial.point for item in trials)
     curves = []
@@ -95,7 +95,7 @@ def sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
     mark = (Mark("", x=0.0),)
     left = _left(trials)
     return Figure(
-        key=f"sine{suffix}",
+        key="sine",
         title="Output of the models over a sinusoidal rate",
         caption="A static model jumps where the rate changes its sign. In a dynamic one the "
         "bristles reverse first: the torque comes late, without a jump, on different branches for "
@@ -149,7 +149,7 @@ def _near(curve: Curve, rate: float) -> Curve:
     return Curve(x, y, curve.label, curve.series, curve.style)
 
 
-def variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Figure]:
+def variation_figures(trials: Sequence[TrialData]) -> Iterator[Figure]:
     """Parameters that steady sliding does not show (Figure 5.12), and the others (5.13)."""
     by_parameter: dict[str, list[TrialData]] = {}
     for item in trials:
@@ -159,7 +159,7 @@ def variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Figu
     static = {name: items for name, items in by_parameter.items() if name not in dynamic}
     if dynamic:
         yield Figure(
-            key=f"dynamic-parameters{suffix}",
+            key="dynamic-parameters",
             title="Output of the model for variations of its dynamic parameters",
             caption="Only near zero rate: steady sliding does not depend on these parameters. They "
             "determine how the torque reverses.",
@@ -171,7 +171,7 @@ def variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Figu
         )
     if static:
         yield Figure(
-            key=f"static-parameters{suffix}",
+            key="static-parameters",
             title="Output of the model for variations of its static parameters",
             caption="Torques move the whole curve, viscous friction its slope, and the Stribeck "
             "velocity only the fall at low rates.",
@@ -193,10 +193,10 @@ def _is_dynamic(varied: list[TrialData], plain: list[TrialData]) -> bool:
 def _variation(
     parameter: str, varied: list[TrialData], plain: list[TrialData], near_zero: bool
 ) -> Panel:
-    ordered = sorted((*varied, *plain), key=lambda item: float(str(item.trial.point["factor"])))
+    ordered = sorted((*varied, *plain), key=lambda item: number_of(item.trial, "factor"))
     curves = []
     for item in ordered:
-        factor = float(str(item.trial.point["factor"]))
+        factor = number_of(item.trial, "factor")
         cut, torque = cycle(item)
         series = "reference" if factor == 1.0 else f"factor {factor:g}"
         label = UNCHANGED if factor == 1.0 else f"× {factor:g}"

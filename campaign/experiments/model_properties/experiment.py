@@ -74,10 +74,6 @@ def _scale(data: TrialData) -> Scale:
     return Scale.of(given[str(point["set"])], inertia, str(point["model"]))
 
 
-def _number_of_trials(data: TrialData) -> int:
-    return sum(1 for _ in requests(_scale(data), bench_of(data.trial)))
-
-
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
     return tuple(estimates(data, _scale(data)))
 
@@ -111,7 +107,8 @@ def _judged(data: TestData, notes: list[str]) -> Iterator[ModelVerdict]:
                 if item.trial.point["model"] == model and item.trial.point["set"] == name
             ]
             points = {canonical_json(item.trial.point) for item in own}
-            if not own or len(points) < _number_of_trials(own[0]):
+            planned = requests(_scale(own[0]), bench_of(own[0].trial)) if own else ()
+            if not own or len(points) < len(list(planned)):
                 notes.append(f"{model}, {name}: trials are missing; the model is left out.")
                 break
             measured = [(each.trial.point, metrics(each, _measure)) for each in own]

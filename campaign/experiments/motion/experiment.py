@@ -25,13 +25,14 @@ from campaign.experiments.friction_map.stretches import StretchOptions, force_of
 from campaign.experiments.friction_map.tables import point_table
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics, validated
 from campaign.experiments.motion.account import (
+    Motion,
     account_of,
     line_table,
     motion_findings,
     summary_table,
 )
 from campaign.experiments.motion.figures import friction_figure, motion_figure
-from campaign.experiments.shared.common import COUNTED, of_recording, suffixes
+from campaign.experiments.shared.common import COUNTED, numbered, of_recording
 from campaign.experiments.shared.recorded_motion import nothing_to_plan
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
@@ -114,23 +115,24 @@ def _analyse(data: TestData) -> Result:
     ]
     if not motions:
         return Result()
-    tables = [summary_table(motions)]
-    figures = []
-    for motion, suffix in zip(motions, suffixes(len(motions)), strict=True):
-        figures.append(motion_figure(motion, suffix))
-        if motion.sliding.maps:
-            figures.append(friction_figure(motion, suffix))
-        if motion.sliding.points or motion.sliding.left:
-            every = (*motion.sliding.points, *motion.sliding.left)
-            tables.append(point_table(every, motion.data, suffix, motion.data.trial.label))
-    if any(motion.coulomb for motion in motions):
-        tables.insert(1, line_table(motions))
+    lines = (line_table(motions),) if any(motion.coulomb for motion in motions) else ()
+    each = numbered(map(_of_motion, motions))
     return Result(
-        tuple(tables),
-        tuple(figures),
+        (summary_table(motions), *lines, *each.tables),
+        each.figures,
         tuple(finding for motion in motions for finding in motion_findings(motion)),
         tuple(notes),
-        telling=next((each.key for each in figures if each.key.startswith("friction")), ""),
+        telling=next((f.key for f in each.figures if f.key.startswith("friction")), ""),
+    )
+
+
+def _of_motion(motion: Motion) -> Result:
+    """Stretches of one recording, its course, and its friction over rate."""
+    sliding, trial = motion.sliding, motion.data.trial
+    every = (*sliding.points, *sliding.left)
+    return Result(
+        (point_table(every, motion.data, trial.label),) if every else (),
+        (motion_figure(motion), *((friction_figure(motion),) if sliding.maps else ())),
     )
 
 

@@ -22,7 +22,7 @@ from campaign.text import count
 TIME = Axis("Time", "s", "s")
 
 
-def motion_figure(motion: Motion, suffix: str) -> Figure:
+def motion_figure(motion: Motion) -> Figure:
     """Position with its reference, rate, drive torque and tracking error over time."""
     recording = motion.data.recording()
     time = recording.time
@@ -59,7 +59,7 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
     steady = f"shaded: {shown}" if marks else "nowhere is it steady"
     top = amount(motion.found["top_rate"].value, "rad/s", "deg/s")
     return Figure(
-        key=f"motion{suffix}",
+        key="motion",
         title=f"Motion of {motion.data.trial.label}",
         caption=sentence(f"the axis moves at up to {top}; {steady}") + error,
         alt="Angle, rate and drive torque over time, with the tracking error where a reference was "
@@ -69,7 +69,7 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
     )
 
 
-def friction_figure(motion: Motion, suffix: str) -> Figure:
+def friction_figure(motion: Motion) -> Figure:
     """Friction of the steady stretches over their rate, in both directions, with the fits."""
     sliding = motion.sliding
     panels = [panel for each in sliding.maps for panel in rate_panels(each)]
@@ -87,7 +87,7 @@ def friction_figure(motion: Motion, suffix: str) -> Figure:
             )
         )
     return Figure(
-        key=f"friction{suffix}",
+        key="friction",
         title=f"Friction over rate of {motion.data.trial.label}",
         caption=rate_caption(sliding.maps[0]),
         alt="Friction torque over rate: a dot for each steady stretch, in both directions, and "

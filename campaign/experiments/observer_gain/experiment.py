@@ -278,13 +278,9 @@ def _notes(
 
 def _row(gain: Gain) -> dict[str, Cell]:
     state = "stable" if gain.stable else "unstable" if gain.unstable else "not known"
+    measured = ("corner", "gain", "error", "error_theory", "noise", "noise_theory")
     return {
-        "corner": gain.corner,
-        "gain": gain.gain,
-        "error": gain.error,
-        "error_theory": gain.error_theory,
-        "noise": gain.noise,
-        "noise_theory": gain.noise_theory,
+        **{name: getattr(gain, name) for name in measured},
         "worst": worst_ratio(gain),
         "state": state if gain.corner else "no observer",
     }

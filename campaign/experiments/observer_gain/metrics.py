@@ -14,7 +14,7 @@ from campaign.estimation.intervals import LEVEL, multiplied
 from campaign.estimation.sine_amplitude import amplitude
 from campaign.estimation.stabilization_error import over_blocks, over_trials
 from campaign.experiments.interface import TrialData, bench_of
-from campaign.experiments.shared.common import by_value, compensation_of
+from campaign.experiments.shared.common import by_value, compensation_of, number_of
 from campaign.experiments.shared.pointing_error import error_of, found, measured_part, of_each
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
@@ -113,8 +113,8 @@ def _measured(data: TrialData, cut: Recording) -> Iterator[Estimate]:
         yield error_of(cut, task)
         if FRICTION_TORQUE in cut.channels:
             bench = _bench(data)
-            corner = float(str(data.trial.point["corner"]))
-            value = predicted_error(cut, bench, corner, _inertia(data, bench))
+            corner, inertia = number_of(data.trial, "corner"), _inertia(data, bench)
+            value = predicted_error(cut, bench, corner, inertia)
             yield Estimate.without_interval(ERROR_THEORY, value, "rad", BY_THEORY())
     elif measured == "noise" and LOAD_RATE in cut.channels:
         yield over_blocks(cut[LOAD_RATE], NOISE, "rad/s")

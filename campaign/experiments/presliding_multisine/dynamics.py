@@ -138,10 +138,10 @@ def estimates_of(found: PreslidingDynamics, bench: Bench) -> dict[str, Estimate]
     return estimates
 
 
-def table_of(rows: Sequence[Mapping[str, Cell]], suffix: str = "") -> Table:
+def table_of(rows: Sequence[Mapping[str, Cell]]) -> Table:
     """One row per record, and one for all records together."""
     return Table(
-        key=f"presliding-dynamics{suffix}",
+        key="presliding-dynamics",
         title="Stiffness, damping and inertia below breakaway",
         columns=(
             Column("amplitude", "Largest torque", "N m", "N m", exact=True),
@@ -158,16 +158,14 @@ def table_of(rows: Sequence[Mapping[str, Cell]], suffix: str = "") -> Table:
     )
 
 
-def figures_of(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]) -> Iterator[Figure]:
+def figures_of(found: PreslidingDynamics) -> Iterator[Figure]:
     """Measured and simulated motion, and residuals."""
     largest = int(np.argmax([record.amplitude for record in found.fit.records]))
-    yield _answer_figure(found, largest, suffix, trials)
-    yield _left_figure(found, suffix, trials)
+    yield _answer_figure(found, largest)
+    yield _left_figure(found)
 
 
-def _answer_figure(
-    found: PreslidingDynamics, number: int, suffix: str, trials: tuple[int, ...]
-) -> Figure:
+def _answer_figure(found: PreslidingDynamics, number: int) -> Figure:
     record, channel = found.fit.records[number], found.fit.channels[number][0]
     simulated = found.fit.answers(number)[0]
     seen = channel.there > 0
@@ -178,7 +176,7 @@ def _answer_figure(
     cut = slice(len(measured) // 2, len(measured) // 2 + SHOWN)
     time, axis = record.time, RATE if channel.name == "rate" else Axis("Angle", "rad", "mrad")
     return Figure(
-        key=f"answer{suffix}",
+        key="answer",
         title="Motion below breakaway, measured and simulated",
         caption=f"A part of the trial with {amount(record.amplitude, 'N m')}: torque, measured and "
         "simulated motion (with the sensor's offset and drift), and their difference.",
@@ -203,11 +201,10 @@ def _answer_figure(
                 [Curve(time[cut], (measured - simulated)[cut], "", "measured", "thin")],
             ),
         ),
-        trials=trials,
     )
 
 
-def _left_figure(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]) -> Figure:
+def _left_figure(found: PreslidingDynamics) -> Figure:
     lags = np.arange(1.0, LAGS + 1.0)
     bands = found.misfit.bands
     step = found.fit.records[0].step
@@ -219,7 +216,7 @@ def _left_figure(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]
     frequency = np.array([band.frequency for band in bands])
     error = np.array([abs(band.error) for band in bands])
     return Figure(
-        key=f"left-over{suffix}",
+        key="left-over",
         title="Residual of the fit",
         caption="Autocorrelation of the residuals, with the noise taken for an autoregression: "
         "between the lines is what white noise has. Beside it the residuals' share of the motion "
@@ -240,7 +237,6 @@ def _left_figure(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]
             ),
         ),
         across=2,
-        trials=trials,
     )
 
 
@@ -259,8 +255,6 @@ def damping_figure(
     alone: Sequence[Estimate],
     joint: Mapping[str, Estimate],
     ratio: float,
-    suffix: str,
-    trials: tuple[int, ...],
 ) -> Figure:
     """Damping of each record and of all records, and the damping by a rule of thumb.
 
@@ -272,7 +266,7 @@ def damping_figure(
     together = Curve.of(ends, [joint["damping_at_rest"]] * 2, "all together", "fit", "line")
     each = [Curve.of(amplitudes, alone, "each trial", "measured")] if alone else []
     return Figure(
-        key=f"damping{suffix}",
+        key="damping",
         title="Damping of the bristles, measured and assumed",
         caption=f"Measured: {amount(joint['damping_at_rest'].value, 'N m s/rad')}. A damping ratio "
         f"of {ratio:g}, as it is assumed where nothing was measured (Equation 4.12), would make it "
@@ -286,7 +280,6 @@ def damping_figure(
                 marks=(Mark("assumed", y=rule),),
             ),
         ),
-        trials=trials,
     )
 
 

@@ -42,7 +42,7 @@ from campaign.experiments.presliding_multisine.small_motions import (
     usable,
 )
 from campaign.experiments.shared.captions import trials_of
-from campaign.experiments.shared.common import conditions, of_each_place
+from campaign.experiments.shared.common import conditions, number_of, of_each_place
 from campaign.experiments.shared.multisine import (
     PER_LINE,
     below_breakaway,
@@ -132,18 +132,18 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 def _analyse(data: TestData) -> Result:
     """Result of each place of the sweep; a model is fitted to all small motions together."""
     if data.model is not None:
-        return _of_group(data, data.trials, "")
+        return _of_group(data, data.trials)
     return of_each_place(data.completed(), OWN, partial(_of_group, data))
 
 
-def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
+def _of_group(data: TestData, group: Sequence[TrialData]) -> Result:
     """Result of the trials of one place of the sweep, or of all that a model suits."""
     rows: list[dict[str, Cell]] = []
     notes: list[str] = []
     single: list[tuple[float, Estimate]] = []
     planned = all(map(is_planned, group))
     for item in group if planned else ():  # others may be long, and many
-        amplitude = float(str(item.trial.point["amplitude"]))
+        amplitude = number_of(item.trial, "amplitude")
         try:
             own = metrics(item, _measure)
         except ValueError as error:
@@ -156,22 +156,22 @@ def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result
         fit = _fit(group)
     except ValueError as error:
         text = f"No fit of all trials together: {error}."
-        tables = (table_of(rows, suffix),) if rows else ()
+        tables = (table_of(rows),) if rows else ()
         return Result(tables, notes=(*notes, text))
     joint = _told(fit, group)
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
     shown = trials_of(group)
-    figures = list(figures_of(fit, suffix, shown))
+    figures = list(figures_of(fit))
     sizes = [each.amplitude for each in fit.fit.records]
     numbers = [joint[name] for name in QUANTITIES if name in joint]
     if single or (not planned and len(numbers) == len(QUANTITIES) and joint[DAMPING].has_interval):
         ratio = (data.model or options_of(group[0])).damping_ratio
         amplitudes = np.array([each for each, _ in single] or sizes)
         alone = [each for _, each in single]
-        figures.append(damping_figure(amplitudes, alone, joint, ratio, suffix, shown))
+        figures.append(damping_figure(amplitudes, alone, joint, ratio))
     result = Result(
-        (table_of([*rows, {"amplitude": "all", **joint}], suffix),),
-        tuple(figures),
+        (table_of([*rows, {"amplitude": "all", **joint}]),),
+        tuple(replace(each, trials=shown) for each in figures),
         tuple(Finding.of(each, place) for each in numbers),
         (*notes, *remarks(fit)),
     )

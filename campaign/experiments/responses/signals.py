@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from campaign.arrays import Array
 from campaign.channels import (
@@ -22,12 +23,14 @@ from campaign.channels import (
 from campaign.estimate import Window
 from campaign.estimation.frequency.multisine import repetition
 from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency.welch import Estimator
 from campaign.estimation.inverse.motion import whole_pieces
 from campaign.experiments.interface import TrialData
+from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Recording, Task, Trial
-from campaign.units import rate_text, torque_text
+from campaign.units import Frequency, Time, rate_text, torque_text
 
 SENSORS: Mapping[Side, tuple[str, ...]] = {
     "load": (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE),
@@ -44,6 +47,21 @@ STEADY = "steady"
 Excited = Literal["auto", "input", "reference"]
 
 
+class ResponseOptions(Options):
+    """Options of the responses of trials."""
+
+    excited: Excited = "auto"
+    """input: no loop acts on the torque; reference: a loop makes the torque, and the command is the
+    external input of the loop; auto: by the trials' modes."""
+    estimator: Estimator = "H1"
+    """Estimator for torques without a loop: H1 (noise on the rate), H2 (on the torque), Hv (on
+    both)."""
+    resolution: Frequency | None = Field(default=None, gt=0)
+    """Resolution of averaged spectra; absent: a segment is a sixteenth of all samples."""
+    period: Time | None = Field(default=None, gt=0)
+    """Period of a multisine in recordings without its command; absent: that of the command."""
+
+
 def steady_window(trial: Trial) -> Window:
     """The measured window: `STEADY`, or that of the task for an older trial."""
     named = (window for window in trial.windows if window.name == STEADY)
@@ -55,13 +73,14 @@ class Signals:
     """Signals of one trial: torque, answers by side, and reference of its loop.
 
     Attributes:
+        data: the trial.
         rate: sample rate (Hz).
         time, torque: shape (n,); NaN where a sample was lost.
         answers: rate or angle at the load by side, shape (n,); `channels`: its source.
         reference: command, shape (n,); None if it is unknown or constant.
     """
 
-    number: int
+    data: TrialData
     rate: float
     time: Array
     torque: Array
@@ -138,7 +157,7 @@ def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
     if duration <= 0:
         raise ValueError("it has no samples")
     return Signals(
-        trial.trial.number,
+        trial,
         (n - 1) / duration,
         recording.time,
         recording[DRIVE_TORQUE],
@@ -209,14 +228,6 @@ def repeated(trial: TrialData, excited: Excited) -> float | None:
     return None if samples is None else samples * step
 
 
-def found_repeating(period: float) -> str:
-    """Remark on a recording that is treated as a multisine."""
-    return (
-        f"What excites repeats every {period:.6g} s and has many lines: it is taken for a "
-        "multisine of that period. `frequency_response.period` says it otherwise."
-    )
-
-
 def unused(trials: Sequence[TrialData], bench: Bench) -> Iterator[str]:
     """Sentence on recorded motor sensors that cannot be used without a gear ratio."""
     if bench.ratio is not None:
@@ -235,10 +246,8 @@ SAME_SIZE = 1.1
 of one command have the same rms whatever their phases, and noise and a torque loop add a few
 percent; amplitudes that are to show the effect of friction differ by a quarter or more."""
 
-Recorded = tuple[TrialData, Signals]
 
-
-def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]]:
+def by_amplitude(trials: Sequence[Signals], period: float) -> list[list[Signals]]:
     """Groups of equal rms of the excited signal, the largest first; in each by trial number.
 
     A new group begins where neighbours in size differ by more than `SAME_SIZE`.
@@ -246,14 +255,14 @@ def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]
     Args:
         period: of the excitation (s).
     """
-    sizes = {signal.number: _rms(signal.leading, signal, period) for _, signal in told}
-    falling = sorted(told, key=lambda each: -sizes[each[1].number])
+    sizes = {each.data.trial.number: _rms(each.leading, each, period) for each in trials}
+    falling = sorted(trials, key=lambda each: -sizes[each.data.trial.number])
     groups = [falling[:1]]
-    for (_, before), each in pairwise(falling):
-        if sizes[before.number] > SAME_SIZE * sizes[each[1].number]:
+    for before, each in pairwise(falling):
+        if sizes[before.data.trial.number] > SAME_SIZE * sizes[each.data.trial.number]:
             groups.append([])
         groups[-1].append(each)
-    return [sorted(group, key=lambda each: each[1].number) for group in groups]
+    return [sorted(group, key=lambda each: each.data.trial.number) for group in groups]
 
 
 def _rms(samples: Array, signal: Signals, period: float) -> float:
@@ -261,9 +270,8 @@ def _rms(samples: Array, signal: Signals, period: float) -> float:
     return float(np.nanstd(samples[-round(period * signal.rate) :]))
 
 
-def size_of(told: Sequence[Recorded], period: float) -> str:
+def size_of(first: Signals, period: float) -> str:
     """Text of the rms of one amplitude; of a recording that of its torque, whose unit is known."""
-    trial, first = told[0]
-    mode = trial.trial.task.mode
+    mode = first.data.trial.task.mode
     rms = _rms(first.torque if mode == "recorded" else first.leading, first, period)
     return f"rms {rate_text(rms) if mode == 'rate' else torque_text(rms)}"

@@ -14,19 +14,17 @@ from campaign.estimation.frequency.best_linear import BestLinear, best_linear
 from campaign.estimation.frequency.measured_response import MeasuredResponse, closed_from_open
 from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency.welch import Estimator, Record, welch_response
 from campaign.estimation.frequency.welch import Excited as Excitation
+from campaign.estimation.frequency.welch import Record, welch_response
 from campaign.estimation.frequency_response import Response, make_response
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.interface import TrialData
 from campaign.experiments.responses.signals import (
-    Excited,
-    Recorded,
+    ResponseOptions,
     Signals,
     base_frequency,
     by_amplitude,
-    found_repeating,
     repeated,
     signals,
     size_of,
@@ -47,8 +45,6 @@ HANN_APART = 2
 """Distance of lines of a Hann window that are nearly uncorrelated."""
 EXCITED_SHARE = 0.03
 """Share of the largest line of a reference (amplitude) above which a line counts as excited."""
-
-
 SIZES = ("amplitude", "rms")
 """Conditions that state the amplitude of a multisine; the amplitude is measured instead."""
 
@@ -85,18 +81,8 @@ class Source:
         return max((each.excitation.rms for each in self.best.values()), default=0.0)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """Settings for reading trials; see the options of `frequency_response`."""
-
-    excited: Excited
-    estimator: Estimator
-    resolution: float | None
-    period: float | None
-
-
 def sources(
-    trials: Sequence[TrialData], bench: Bench, how: Reading
+    trials: Sequence[TrialData], bench: Bench, how: ResponseOptions
 ) -> tuple[list[Source], list[str]]:
     """All responses of the trials, and sentences on trials without one."""
     groups: dict[tuple[str, ...], list[TrialData]] = {}
@@ -116,7 +102,7 @@ def sources(
         parts = {label: recorded}
         if kind == "multisine":
             sized = [
-                (size_of(part, float(period)), part)
+                (size_of(part[0], float(period)), part)
                 for part in by_amplitude(recorded, float(period))
             ]
             parts = {f"{label}, {size}": part for size, part in sized}
@@ -145,7 +131,7 @@ def _named_apart(found: Sequence[Source]) -> list[Source]:
     ]
 
 
-def _key(trial: TrialData, how: Reading) -> tuple[str, ...]:
+def _key(trial: TrialData, how: ResponseOptions) -> tuple[str, ...]:
     """Key of a trial; trials of the same key are one measurement."""
     task, command = trial.trial.task, trial.trial.task.command
     own = {"frequency", "seed", "realisation", "realization"}
@@ -185,12 +171,12 @@ def _label(group: Sequence[TrialData]) -> str:
 
 
 def _all_signals(
-    group: Sequence[TrialData], bench: Bench, how: Reading
-) -> tuple[list[Recorded], list[str]]:
+    group: Sequence[TrialData], bench: Bench, how: ResponseOptions
+) -> tuple[list[Signals], list[str]]:
     recorded, refused = [], []
     for trial in group:
         try:
-            recorded.append((trial, signals(trial, bench, how.excited)))
+            recorded.append(signals(trial, bench, how.excited))
         except ValueError as error:
             refused.append((trial.trial.label, error))
     if not recorded:
@@ -205,16 +191,16 @@ def _as_rates(measured: MeasuredResponse, told: Signals, side: Side) -> Measured
     return measured.times(np.asarray(2j * np.pi * measured.frequency))
 
 
-def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
+def _of_sines(name: str, trials: Sequence[Signals], _: ResponseOptions) -> Source:
     remarks: list[str] = []
-    points: dict[Side, list[SinePoint]] = {side: [] for side in told[0][1].answers}
+    points: dict[Side, list[SinePoint]] = {side: [] for side in trials[0].answers}
     loop = []
-    for trial, signal in told:
-        task = trial.trial.task
+    for signal in trials:
+        task = signal.data.trial.task
         command = task.command
         if not isinstance(command, Sine):
             continue
-        cut = _steady(trial, signal.time)
+        cut = _steady(signal)
         frequency, time = command.frequency, signal.time[cut]
         try:
             for side in points:
@@ -225,9 +211,9 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
                 answer = signal.answers["load"][cut]
                 loop.append(sine_point(time, signal.reference[cut], answer, frequency))
         except ValueError as error:
-            remarks.append(f"{trial.trial.label}: {error}.")
+            remarks.append(f"{signal.data.trial.label}: {error}.")
     responses = {
-        side: _as_rates(MeasuredResponse.of(make_response(each)), told[0][1], side)
+        side: _as_rates(MeasuredResponse.of(make_response(each)), trials[0], side)
         for side, each in points.items()
         if len({point.frequency for point in each}) >= FEWEST_SINES
     }
@@ -235,56 +221,61 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
         raise ValueError(f"fewer than {FEWEST_SINES} frequencies are no response")
     first = next(iter(responses.values())).frequency
     closed = None
-    if len(loop) >= FEWEST_SINES and not told[0][1].is_angle("load"):
+    if len(loop) >= FEWEST_SINES and not trials[0].is_angle("load"):
         closed = make_response(loop)
-    amplitude = max(abs(t.trial.task.command.amplitude) for t, _ in told)  # type: ignore[union-attr]
-    in_rate = told[0][0].trial.task.mode == "rate"
+    commands = [each.data.trial.task.command for each in trials]
+    amplitude = max(abs(each.amplitude) for each in commands)  # type: ignore[union-attr]
+    in_rate = trials[0].data.trial.task.mode == "rate"
     largest = rate_text(amplitude) if in_rate else torque_text(amplitude, ".4g")
     excitation = (
         f"{len(first)} single sines from {first[0]:.4g} to {first[-1]:.4g} Hz, "
         f"amplitude up to {largest}"
     )
-    numbers = tuple(trial.trial.number for trial, _ in told)
+    numbers = tuple(each.data.trial.number for each in trials)
     return Source(name, "sines", excitation, numbers, responses, closed, remarks=tuple(remarks))
 
 
-def _steady(trial: TrialData, time: Array) -> slice:
+def _steady(signal: Signals) -> slice:
     """Samples of the measured window."""
-    window = steady_window(trial.trial)
+    window, time = steady_window(signal.data.trial), signal.time
     half = 0.5 * (time[1] - time[0])
     first, last = np.searchsorted(time, (window.start - half, window.stop - half))
     return slice(int(first), int(last))
 
 
-def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
+def _of_multisine(name: str, trials: Sequence[Signals], how: ResponseOptions) -> Source:
     remarks: list[str] = []
-    rate = told[0][1].rate
-    period = _period_of(told[0][0], how)
-    if how.period is None and not isinstance(told[0][0].trial.task.command, MultiSine):
-        remarks.append(found_repeating(period))
+    rate, first_trial = trials[0].rate, trials[0].data
+    period = _period_of(first_trial, how)
+    if how.period is None and not isinstance(first_trial.trial.task.command, MultiSine):
+        remarks.append(
+            f"What excites repeats every {period:.6g} s and has many lines: it is taken for a "
+            "multisine of that period. `frequency_response.period` says it otherwise."
+        )
     samples = round(period * rate)
     if abs(samples - period * rate) > 1e-3:
         raise ValueError(f"its period of {period:.6g} s is no whole number of samples")
     kept, numbers = [], []
-    windows = [_steady(trial, signal.time) for trial, signal in told]
+    windows = [_steady(signal) for signal in trials]
     periods = min((window.stop - window.start) // samples for window in windows)
-    for (trial, signal), window in zip(told, windows, strict=True):
+    for signal, window in zip(trials, windows, strict=True):
+        trial = signal.data.trial
         parts = [signal.torque, *signal.answers.values()]
         if signal.reference is not None:
             parts.append(signal.reference)
         # The last whole periods leave most time for a transient.
         tail = slice(window.stop - periods * samples, window.stop)
         if periods < 1 or not all(np.all(np.isfinite(part[tail])) for part in parts):
-            remarks.append(f"{trial.trial.label}: a period has lost samples; it is left out.")
+            remarks.append(f"{trial.label}: a period has lost samples; it is left out.")
             continue
         kept.append((signal, tail))
-        numbers.append(trial.trial.number)
+        numbers.append(trial.number)
     if not kept:
         raise ValueError("no whole period without a lost sample")
     with_reference = all(signal.reference is not None for signal, _ in kept)
     reference = _stacked([(s.reference, t) for s, t in kept]) if with_reference else None
     torque = _stacked([(s.torque, t) for s, t in kept])
-    lines = _lines(told[0][0], period, torque if reference is None else reference, periods)
+    lines = _lines(first_trial, period, torque if reference is None else reference, periods)
     acts_on: Excitation = "reference" if reference is not None else "input"
     best: dict[Side, BestLinear] = {}
     responses: dict[Side, MeasuredResponse] = {}
@@ -293,14 +284,14 @@ def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
         linear = best_linear(torque, answer, rate, periods, lines, acts_on, reference)
         best[side], responses[side] = linear, _as_rates(linear.response, kept[0][0], side)
     closed = None
-    if told[0][0].trial.task.mode == "rate" and reference is not None:
+    if first_trial.trial.task.mode == "rate" and reference is not None:
         closed = _loop_of(kept, reference, rate, periods, lines)
     first = next(iter(best.values()))
     remarks += first.undetermined
     return Source(
         name,
         "multisine",
-        _named(first, told[0][0]),
+        _named(first, first_trial),
         tuple(numbers),
         responses,
         closed,
@@ -339,7 +330,7 @@ def _stacked(parts: Sequence[tuple[Array | None, slice]]) -> Array:
     return np.stack([part[cut] for part, cut in parts if part is not None])
 
 
-def _period_of(trial: TrialData, how: Reading) -> float:
+def _period_of(trial: TrialData, how: ResponseOptions) -> float:
     task = trial.trial.task
     commanded = (
         _period(task.command, task.duration) if isinstance(task.command, MultiSine) else None
@@ -366,41 +357,39 @@ def _lines(trial: TrialData, period: float, leading: Array, periods: int) -> Lin
     return np.flatnonzero(size > least).astype(np.int64)
 
 
-def _of_records(name: str, told: Sequence[Recorded], how: Reading) -> Source:
-    rates = {round(signal.rate, 6) for _, signal in told}
+def _of_records(name: str, trials: Sequence[Signals], how: ResponseOptions) -> Source:
+    rates = {round(signal.rate, 6) for signal in trials}
     if len(rates) > 1:
         raise ValueError("its trials were sampled at different rates")
-    rate = told[0][1].rate
+    rate, mode = trials[0].rate, trials[0].data.trial.task.mode
     segment = None if how.resolution is None else round(rate / how.resolution)
-    excited = _what_is_excited(told, how)
+    excited: Excitation = "input" if mode == "torque" else "reference"
+    if how.excited != "auto":
+        excited = how.excited
     responses: dict[Side, MeasuredResponse] = {}
-    for side in told[0][1].answers:
-        records = _records(told, side, segment or 64, None)
+    for side in trials[0].answers:
+        records = _records(trials, side, segment or 64, None)
         measured = welch_response(records, excited, how.estimator, segment)
-        responses[side] = _as_rates(_coherent(measured), told[0][1], side)
+        responses[side] = _as_rates(_coherent(measured), trials[0], side)
     closed = None
-    if told[0][0].trial.task.mode == "rate" and not told[0][1].is_angle("load"):
-        records = _records(told, "load", segment or 64, "error")
+    if mode == "rate" and not trials[0].is_angle("load"):
+        records = _records(trials, "load", segment or 64, "error")
         loop = _coherent(welch_response(records, "reference", segment=segment))
         closed = closed_from_open(loop.at(slice(None, None, HANN_APART))).response
     first = next(iter(responses.values()))
     if len(first.frequency) < FEWEST_SINES:
         raise ValueError("hardly a frequency is coherent: the recording excites nothing")
-    numbers = tuple(trial.trial.number for trial, _ in told)
-    excitation = f"whatever {len(told)} trials moved by; {first.method}"
+    numbers = tuple(each.data.trial.number for each in trials)
+    excitation = f"whatever {len(trials)} trials moved by; {first.method}"
     return Source(name, "records", excitation, numbers, responses, closed, every=HANN_APART)
 
 
-def _what_is_excited(told: Sequence[Recorded], how: Reading) -> Excitation:
-    if how.excited != "auto":
-        return how.excited
-    return "input" if told[0][0].trial.task.mode == "torque" else "reference"
-
-
-def _records(told: Sequence[Recorded], side: Side, shortest: int, what: str | None) -> list[Record]:
+def _records(
+    trials: Sequence[Signals], side: Side, shortest: int, what: str | None
+) -> list[Record]:
     """Segments without a lost sample; `what`: `error` takes reference less output as the input."""
     records = []
-    for _, signal in told:
+    for signal in trials:
         if side not in signal.answers:
             continue
         answer, reference, input_ = signal.answers[side], signal.reference, signal.torque

@@ -59,7 +59,9 @@ def distortion_tables(found: Sequence[Source]) -> Iterator[Table]:
             if best.distortion is None:
                 continue
             own = {"source": each.name, "side": side}
-            rows.append({**own, **_band(best.distortion), "excitation": each.excitation})
+            totals = _totals(best.distortion)
+            levels = {f"{name}_level": _decibels(one) for name, one in totals.items()}
+            rows.append({**own, **totals, **levels, "excitation": each.excitation})
             lines += [{**own, **line} for line in _lines(best, best.distortion)]
     if not rows:
         return
@@ -114,11 +116,6 @@ def _totals(distortion: Distortion) -> dict[str, Estimate]:
     return {"even": total(distortion, "even"), "odd": total(distortion, "odd")}
 
 
-def _band(distortion: Distortion) -> dict[str, Estimate]:
-    totals = _totals(distortion)
-    return totals | {f"{name}_level": _decibels(each) for name, each in totals.items()}
-
-
 def _decibels(share: Estimate) -> Estimate:
     """The level (dB) of a ratio of amplitudes."""
     name, value = f"{share.name}_level", _db(share.value)
@@ -166,12 +163,14 @@ def _level(level: Level, low: Array, high: Array, beside: Array, k: int) -> Esti
     # The subtracted noise is an estimate: no bound lies below its level.
     most = _db(max(float(high[k]), math.sqrt(float(level.noise[k]))) / float(beside[k]))
     if not level.significant[k] or not level.rms[k] > 0:
-        return Estimate(
-            "distortion", most, "dB", method=method, kind="at most", reason=WITHIN_NOISE()
-        )
+        return _within_noise(most, method)
     value = _db(float(level.rms[k] / beside[k]))
     least = _db(float(low[k] / beside[k])) if low[k] > 0 else None
     return Estimate("distortion", value, "dB", least, max(most, value), LEVEL, method)
+
+
+def _within_noise(most: float, method: str) -> Estimate:
+    return Estimate("distortion", most, "dB", method=method, kind="at most", reason=WITHIN_NOISE())
 
 
 def _excited(best: BestLinear, output: Array) -> Iterator[dict[str, Any]]:
@@ -198,11 +197,7 @@ def _excited(best: BestLinear, output: Array) -> Iterator[dict[str, Any]]:
                     LEVEL, method,
                 )  # fmt: skip
             else:
-                level = Estimate(
-                    "distortion", _db(max(math.sqrt(ends[1]), noise)), "dB", method=method,
-                    kind="at most",
-                    reason=WITHIN_NOISE(),
-                )  # fmt: skip
+                level = _within_noise(_db(max(math.sqrt(ends[1]), noise)), method)
         yield {
             "line": "excited",
             "frequency": float(frequency),

@@ -16,7 +16,7 @@ import numpy as np
 from campaign.channels import COMPENSATION_TORQUE, RELATIVE_RATE
 from campaign.estimate import Window
 from campaign.experiments.interface import TrialData, with_samples
-from campaign.experiments.shared.common import method_label
+from campaign.experiments.shared.common import method_label, number_of
 from campaign.experiments.shared.friction_models import PARAMETER_LABELS
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
@@ -97,9 +97,8 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
     runs: dict[str, dict[float, TrialData]] = {}
     for data in with_samples(measured):
         if data.trial.task.mode == "prescribed":
-            point = data.trial.point
-            by_change = runs.setdefault(str(point["parameter"]), {})
-            by_change[float(str(point["change"]))] = data
+            by_change = runs.setdefault(str(data.trial.point["parameter"]), {})
+            by_change[number_of(data.trial, "change")] = data
     plain = runs.pop("", {}).get(0.0)
     if plain is None:
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from campaign.experiments.interface import TestData, TrialData
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
 from campaign.result import Array, Result, Value
-from campaign.trial import Tree, canonical_json
+from campaign.trial import Tree, Trial, canonical_json
 from campaign.units import TORQUE
 
 OF_NO_OPTION = {"average_friction": TORQUE}
@@ -68,11 +69,16 @@ def grouped(
     return {key: tuple(group) for key, group in groups.items()}
 
 
+def number_of(trial: Trial, name: str) -> float:
+    """A number of the trial's sweep point (SI)."""
+    return float(str(trial.point[name]))
+
+
 def by_value(trials: Iterable[TrialData], name: str) -> dict[float, tuple[TrialData, ...]]:
     """Trials by a number of their points (SI), ascending; repeats are in one group."""
     groups: dict[float, list[TrialData]] = {}
     for item in trials:
-        groups.setdefault(float(str(item.trial.point[name])), []).append(item)
+        groups.setdefault(number_of(item.trial, name), []).append(item)
     return {value: tuple(groups[value]) for value in sorted(groups)}
 
 
@@ -116,22 +122,29 @@ def correlations(names: Sequence[str], matrix: Array) -> dict[tuple[str, str], f
     }
 
 
-def suffixes(count: int) -> list[str]:
-    """Suffixes of the keys of several tables or figures; "" for a single one."""
-    return [f"-{number}" if count > 1 else "" for number in range(1, count + 1)]
+def numbered(results: Iterable[Result]) -> Result:
+    """Joined results of several places; if there are several, their keys get its number."""
+    every = list(results)
+    if len(every) > 1:
+        every = [_keyed(each, number) for number, each in enumerate(every, start=1)]
+    return joined(every)
+
+
+def _keyed(result: Result, number: int) -> Result:
+    return replace(
+        result,
+        tables=tuple(replace(each, key=f"{each.key}-{number}") for each in result.tables),
+        figures=tuple(replace(each, key=f"{each.key}-{number}") for each in result.figures),
+    )
 
 
 def of_each_place(
     trials: Iterable[TrialData],
     own: Sequence[str],
-    analyse: Callable[[tuple[TrialData, ...], str], Result],
+    analyse: Callable[[tuple[TrialData, ...]], Result],
 ) -> Result:
-    """Joined results of each sweep point, without the conditions named in `own`.
-
-    analyse: result of the trials of a point, and the suffix of its keys: "" for a single point.
-    """
-    groups = grouped(trials, own).values()
-    return joined(map(analyse, groups, suffixes(len(groups))))
+    """Joined results of each sweep point, without the conditions named in `own`."""
+    return numbered(map(analyse, grouped(trials, own).values()))
 
 
 def compensation_of(bench: Bench, name: str) -> Any:

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Estimate
+from campaign.parameter import is_value
 from campaign.reason import Cause
 
 OFFSET_OR_ASYMMETRY = Cause(
@@ -26,14 +27,10 @@ def with_offset(found: Mapping[str, Estimate], name: str) -> dict[str, Estimate]
         differ by less than the larger of their half-widths, nothing is added.
     """
     both = [found.get(f"{name}_{side}") for side in ("positive", "negative")]
-    determined = [each for each in both if each is not None and _is_number(each)]
+    determined = [each for each in both if each is not None and is_value(each)]
     widest = max((each.half_width for each in determined), default=0.0)
     if len(determined) < 2 or not abs(determined[0].value - determined[1].value) > widest:
         return dict(found)
     reason = OFFSET_OR_ASYMMETRY(half=0.5 * abs(determined[0].value - determined[1].value))
     names = [key for key, each in found.items() if each in determined and not each.reason]
     return {**found, **{key: replace(found[key], reason=reason) for key in names}}
-
-
-def _is_number(one: Estimate) -> bool:
-    return one.origin is Origin.MEASURED and one.kind == "number" and one.has_interval

@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import ValidationInfo, model_validator
 
 from campaign.axis_kind import in_axis_terms
-from campaign.options import Options, TextFile
+from campaign.options import Options, TextFile, is_archived
 from campaign.signals import Array, Polyline
 from campaign.units import ANGLE, ANGULAR_ACCELERATION, ANGULAR_RATE, TIME, Quantity
 
@@ -71,7 +71,7 @@ class SeriesFile(Options):
 
     @model_validator(mode="after")
     def _readable(self, info: ValidationInfo) -> Self:
-        if isinstance(info.context, Mapping) and info.context.get("si"):
+        if is_archived(info):
             return self  # already read; here the kind of the axis is not known
         TIME.parse(f"1 {self.time}")
         _ = self.quantity
@@ -83,57 +83,42 @@ class SeriesFile(Options):
         """Raise ValueError if the series is not valid."""
 
     def samples(self) -> tuple[Array, Array]:
-        """Times (s, from 0) and values (SI), each shape (n,)."""
-        if self.file.text is None:
-            raise ValueError(f"the text of {self.file.name} is not at hand")
-        wanted = (self.time_column, self.value_column)
+        """Times (s, from 0) and values (SI), each shape (n,).
+
+        The separator is a comma, or a semicolon if the header has one. Empty lines and lines that
+        begin with # are skipped. Raises ValueError with file and line for any error.
+        """
         text, name = self.file.text, self.file.name
-        return read_table(text, name, wanted, self.time, self.value, self.quantity)
-
-
-def read_table(
-    text: str,
-    name: str,
-    wanted: tuple[str, str],
-    time_unit: str,
-    value_unit: str,
-    value: Quantity,
-) -> tuple[Array, Array]:
-    """Times (s, from 0) and values (SI), each shape (n,), of a CSV text with a header line.
-
-    The separator is a comma, or a semicolon if the header has one. Empty lines and lines that begin
-    with # are skipped. Raises ValueError with `name` and line for any error.
-
-    Args:
-        wanted: headers of the time and of the values.
-    """
-    time_factor = TIME.parse(f"1 {time_unit}")
-    value_factor = value.parse(f"1 {value_unit}")
-    rows = _rows(text, name)
-    line, header = next(rows, (1, []))
-    columns = [cell.strip() for cell in header]
-    places = []
-    for column in wanted:
-        if columns.count(column) != 1:
-            how = "no column" if column not in columns else "more than one column"
-            headers = ", ".join(columns) or "none"
-            raise ValueError(f"{name}:{line}: {how} '{column}'; the columns are {headers}")
-        places.append(columns.index(column))
-    times: list[float] = []
-    values: list[float] = []
-    for line, row in rows:
-        if len(row) != len(columns):
-            raise ValueError(f"{name}:{line}: {len(row)} values under {len(columns)} columns")
-        if len(times) == MOST_ROWS:
-            raise ValueError(f"{name}:{line}: more than {MOST_ROWS} rows; resample the series")
-        time, number = (_number(row[place], name, line) for place in places)
-        if times and time <= times[-1]:
-            raise ValueError(f"{name}:{line}: the time {time:g} does not come after {times[-1]:g}")
-        times.append(time)
-        values.append(number)
-    if len(times) < 2:
-        raise ValueError(f"{name}: a series needs at least two rows under its header")
-    return (np.array(times) - times[0]) * time_factor, np.array(values) * value_factor
+        if text is None:
+            raise ValueError(f"the text of {name} is not at hand")
+        time_factor = TIME.parse(f"1 {self.time}")
+        value_factor = self.quantity.parse(f"1 {self.value}")
+        rows = _rows(text, name)
+        line, header = next(rows, (1, []))
+        columns = [cell.strip() for cell in header]
+        places = []
+        for column in (self.time_column, self.value_column):
+            if columns.count(column) != 1:
+                how = "no column" if column not in columns else "more than one column"
+                headers = ", ".join(columns) or "none"
+                raise ValueError(f"{name}:{line}: {how} '{column}'; the columns are {headers}")
+            places.append(columns.index(column))
+        times: list[float] = []
+        values: list[float] = []
+        for line, row in rows:
+            at = f"{name}:{line}"
+            if len(row) != len(columns):
+                raise ValueError(f"{at}: {len(row)} values under {len(columns)} columns")
+            if len(times) == MOST_ROWS:
+                raise ValueError(f"{at}: more than {MOST_ROWS} rows; resample the series")
+            time, number = (_number(row[place], at) for place in places)
+            if times and time <= times[-1]:
+                raise ValueError(f"{at}: the time {time:g} does not come after {times[-1]:g}")
+            times.append(time)
+            values.append(number)
+        if len(times) < 2:
+            raise ValueError(f"{name}: a series needs at least two rows under its header")
+        return (np.array(times) - times[0]) * time_factor, np.array(values) * value_factor
 
 
 def motion_signal(time: Array, value: Array, kind: Kind, lead_in: float) -> Polyline:
@@ -177,11 +162,11 @@ def _rows(text: str, name: str) -> Iterator[tuple[int, list[str]]]:
             raise ValueError(f"{name}:{number}: not readable as CSV: {error}") from None
 
 
-def _number(text: str, name: str, line: int) -> float:
+def _number(text: str, at: str) -> float:
     try:
         number = float(text)
     except ValueError:
-        raise ValueError(f"{name}:{line}: {text.strip()[:40]!r} is not a number") from None
+        raise ValueError(f"{at}: {text.strip()[:40]!r} is not a number") from None
     if not math.isfinite(number):
-        raise ValueError(f"{name}:{line}: {text.strip()[:40]!r} is not a finite number")
+        raise ValueError(f"{at}: {text.strip()[:40]!r} is not a finite number")
     return number

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from campaign.experiments import experiments
 from campaign.experiments.interface import bench_of
-from campaign.options import Options, describe
+from campaign.options import describe
 from campaign.physics.bench_knowledge import number_at
 from campaign.result import Axis, Value
 from campaign.text import pretty_unit
@@ -19,12 +20,13 @@ from campaign.units import Quantity, convert
 BENCH = "bench."
 
 
-def quantity_of(path: str, trial: Trial, options: type[Options]) -> Quantity | None:
+def quantity_of(path: str, trial: Trial) -> Quantity | None:
     """The quantity of a swept value; None for a number without unit and other values."""
     if path.startswith(BENCH):
         at = number_at(bench_of(trial), path.removeprefix(BENCH))
         return at[1] if at else None
-    quantities = (info.quantity for info in describe(options) if info.name == path)
+    options = describe(experiments()[trial.kind].options)
+    quantities = (info.quantity for info in options if info.name == path)
     quantity = next(quantities, None)
     return quantity and quantity.here
 
@@ -47,19 +49,16 @@ def shown_value(value: object, quantity: Quantity | None) -> str:
 
 
 def words(
-    point: Mapping[str, Value],
-    trial: Trial,
-    options: type[Options],
-    bare: frozenset[str] = frozenset(),
+    point: Mapping[str, Value], trial: Trial, bare: frozenset[str] = frozenset()
 ) -> Iterator[str]:
     """Values of a point as text: `0.24 Hz` for paths in `bare`, else `preload torque 50 N·m`."""
     for path, value in point.items():
-        text = shown_value(value, quantity_of(path, trial, options))
+        text = shown_value(value, quantity_of(path, trial))
         yield text if path in bare else f"{name_of(path)} {text}"
 
 
-def axis_of(path: str, trial: Trial, options: type[Options]) -> Axis:
+def axis_of(path: str, trial: Trial) -> Axis:
     """The axis along a swept number."""
-    quantity, name = quantity_of(path, trial, options), name_of(path)
+    quantity, name = quantity_of(path, trial), name_of(path)
     label = name[:1].upper() + name[1:]
     return Axis(label, quantity.si, quantity.display) if quantity else Axis(label)

@@ -11,7 +11,6 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.experiments.shared.common import method_label, short_label
 from campaign.experiments.shared.swept_words import axis_of, name_of, words
-from campaign.options import Options
 from campaign.result import Axis, Cell, Curve, Figure, Panel, Value
 from campaign.trial import Trial
 
@@ -34,16 +33,14 @@ BY_METHOD = "error-by-method"
 Rows = Sequence[Mapping[str, Cell]]
 
 
-def error_figures(
-    rows: Rows, paths: Sequence[str], trial: Trial, options: type[Options]
-) -> Iterator[Figure]:
+def error_figures(rows: Rows, paths: Sequence[str], trial: Trial) -> Iterator[Figure]:
     """One figure for each swept number, two at most; without a swept number, one by method."""
     known = [row for row in rows if _error(row) is not None]
     swept = [path for path in paths if len(_numbers(known, path)) >= SEVERAL][:2]
     for path in swept:
-        yield _along(path, known, paths, trial, options)
+        yield _along(path, known, paths, trial)
     if not swept and len(known) > 1:
-        yield _by_method(known, paths, trial, options)
+        yield _by_method(known, paths, trial)
 
 
 def _error(row: Mapping[str, Cell]) -> Estimate | None:
@@ -77,22 +74,20 @@ def _places(rows: Rows, paths: Sequence[str], *without: str) -> list[tuple[dict[
     return [(point, group) for point, group in places]
 
 
-def _along(
-    path: str, rows: Rows, paths: Sequence[str], trial: Trial, options: type[Options]
-) -> Figure:
+def _along(path: str, rows: Rows, paths: Sequence[str], trial: Trial) -> Figure:
     places = _places(rows, paths, COMPENSATION, path)
-    axis, values = axis_of(path, trial, options), _numbers(rows, path)
+    axis, values = axis_of(path, trial), _numbers(rows, path)
     if min(values) > 0 and max(values) >= DECADE * min(values):
         axis = replace(axis, scale="log")
     panels = [
-        Panel(axis, _axis(rows), _curves_along(path, group), _title(point, trial, options))
+        Panel(axis, _axis(rows), _curves_along(path, group), _title(point, trial))
         for point, group in places[:MOST_PANELS]
     ]
     key = "".join(c if c.isalnum() else "-" for c in path.lower())
     return Figure(
         key=f"error-over-{key}",
         title=f"Stabilization error over {name_of(path)}",
-        caption=f"Error (1σ) of each method along the sweep{_where(rows, path, trial, options)}"
+        caption=f"Error (1σ) of each method along the sweep{_where(rows, path, trial)}"
         f"{_with_interval(rows)}.{_left_out(places)}",
         alt=f"Stabilization error over {name_of(path)}, one curve per compensation method.",
         panels=tuple(panels),
@@ -117,23 +112,18 @@ def _curves_along(path: str, rows: Rows) -> list[Curve]:
     return curves
 
 
-def _by_method(rows: Rows, paths: Sequence[str], trial: Trial, options: type[Options]) -> Figure:
+def _by_method(rows: Rows, paths: Sequence[str], trial: Trial) -> Figure:
     methods = list(dict.fromkeys(str(row[COMPENSATION]) for row in rows))
     axis = method_axis(methods)
     places = _places(rows, paths, COMPENSATION)
     panels = [
-        Panel(
-            axis,
-            _axis(rows),
-            [_dot(row, methods) for row in group],
-            _title(point, trial, options),
-        )
+        Panel(axis, _axis(rows), [_dot(row, methods) for row in group], _title(point, trial))
         for point, group in places[:MOST_PANELS]
     ]
     return Figure(
         key=BY_METHOD,
         title="Stabilization error by compensation method",
-        caption=f"Error (1σ) of each method{_where(rows, '', trial, options)}"
+        caption=f"Error (1σ) of each method{_where(rows, '', trial)}"
         f"{_with_interval(rows)}.{_left_out(places)}",
         alt="Stabilization error, one dot with its interval for each compensation method.",
         panels=tuple(panels),
@@ -166,12 +156,12 @@ def _axis(rows: Rows) -> Axis:
     return Axis(label, "rad", "mrad", limits=(0.0, math.nan))
 
 
-def _title(told: Mapping[str, Value], trial: Trial, options: type[Options]) -> str:
-    title = ", ".join(words(told, trial, options, BARE))
+def _title(told: Mapping[str, Value], trial: Trial) -> str:
+    title = ", ".join(words(told, trial, BARE))
     return title[:1].upper() + title[1:]
 
 
-def _where(rows: Rows, along: str, trial: Trial, options: type[Options]) -> str:
+def _where(rows: Rows, along: str, trial: Trial) -> str:
     """` at 36 deg/s²`: frequency and acceleration that all rows share; "" for none."""
     same = {
         name: rows[0].get(name)
@@ -179,7 +169,7 @@ def _where(rows: Rows, along: str, trial: Trial, options: type[Options]) -> str:
         if name != along and len({row.get(name) for row in rows}) == 1
     }
     shown = {name: value for name, value in same.items() if isinstance(value, int | float)}
-    text = " and ".join(words(shown, trial, options, BARE))
+    text = " and ".join(words(shown, trial, BARE))
     return f" at {text}" if text else ""
 
 

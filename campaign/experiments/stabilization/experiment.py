@@ -197,24 +197,16 @@ def _analyse(data: TestData) -> Result:
     firsts = [group[0] for group in groups.values()]
     errors = [finding for finding in findings if finding.quantity == "stabilization_error"]
     findings += compared(errors)
-    figures = list(stabilization_figures(firsts, paths, rows, StabilizationOptions))
+    figures = list(stabilization_figures(firsts, paths, rows))
     extra = [path for path in paths if path not in columns]
     tables = [_table(rows, extra, seen_through(firsts[0].trial) if firsts else "")]
     beside = tuple(beside_rows(rows))
     if beside:
         tables.insert(0, beside_table(beside, extra))  # first, as the purpose of such a test
-    return Result(
-        tuple(tables),
-        tuple(figures),
-        tuple(findings),
-        telling=_telling([figure.key for figure in figures]),
-    )
-
-
-def _telling(keys: Sequence[str]) -> str:
-    """Key of an error figure; by method last, because the table has the same numbers."""
-    errors = [key for key in keys if "error" in key]
-    return min(errors, key=lambda key: key == BY_METHOD, default="")
+    errors_shown = [figure.key for figure in figures if "error" in figure.key]
+    # By method last, because the table has the same numbers.
+    telling = min(errors_shown, key=lambda key: key == BY_METHOD, default="")
+    return Result(tuple(tables), tuple(figures), tuple(findings), telling=telling)
 
 
 def _row(group: Sequence[TrialData]) -> dict[str, Cell]:

@@ -23,7 +23,6 @@ from campaign.experiments.shared.pointing_error import (
 from campaign.experiments.shared.swept_words import words
 from campaign.experiments.stabilization.errors import BARE, COMPENSATION, error_figures
 from campaign.experiments.stabilization.reversal_figures import TIME, can_be_shown, reversal
-from campaign.options import Options
 from campaign.recording import Recording
 from campaign.result import Array, Axis, Cell, Curve, Figure, Mark, Panel
 from campaign.signals import Sine
@@ -73,20 +72,16 @@ class Condition:
 
 
 def stabilization_figures(
-    firsts: Sequence[TrialData],
-    paths: Sequence[str],
-    rows: Sequence[Mapping[str, Cell]],
-    options: type[Options],
+    firsts: Sequence[TrialData], paths: Sequence[str], rows: Sequence[Mapping[str, Cell]]
 ) -> Iterator[Figure]:
     """The errors of the methods, and time histories of one trial per method.
 
     firsts: first trial of each condition and method. rows: of the table, in the same order.
-    options: class of the test's options, which declares units.
     """
     if not firsts:
         return
-    yield from error_figures(rows, paths, firsts[0].trial, options)
-    place = _telling_place(_places(firsts, rows, paths, options))
+    yield from error_figures(rows, paths, firsts[0].trial)
+    place = _telling_place(_places(firsts, rows, paths))
     if any(item.not_kept for item in place.trials.values()):
         return
     yield from _rate_figure(place)
@@ -96,10 +91,7 @@ def stabilization_figures(
 
 
 def _places(
-    firsts: Sequence[TrialData],
-    rows: Sequence[Mapping[str, Cell]],
-    paths: Sequence[str],
-    options: type[Options],
+    firsts: Sequence[TrialData], rows: Sequence[Mapping[str, Cell]], paths: Sequence[str]
 ) -> list[Condition]:
     """Conditions of the sweep, each with all of its methods."""
     trials: dict[str, dict[str, TrialData]] = {}
@@ -115,19 +107,19 @@ def _places(
         Condition(
             each,
             errors.get(key, {}),
-            _condition_words(next(iter(each.values())), options, len(trials)),
+            _condition_words(next(iter(each.values())), len(trials)),
             _numbers(next(iter(each.values()))) if alone else {},
         )
         for key, each in trials.items()
     ]
 
 
-def _condition_words(item: TrialData, options: type[Options], places: int) -> str:
+def _condition_words(item: TrialData, places: int) -> str:
     """`Shown at 2 Hz, 36 deg/s², one of 7 conditions.`: caption text with all swept values."""
     sine = isinstance(item.trial.task.base_acceleration, Sine)
     stated = conditions(item, *(("frequency", "acceleration") if sine else ()))
     point = {path: value for path, value in stated.items() if path != COMPENSATION}
-    text = ", ".join(words(point, item.trial, options, BARE))
+    text = ", ".join(words(point, item.trial, BARE))
     several = f", one of {places} conditions" if places > 1 else ""
     return f" Shown at {text}{several}." if text else ""
 

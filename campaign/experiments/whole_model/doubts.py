@@ -14,10 +14,11 @@ from campaign.estimation.intervals import LEVEL, shifted_by
 from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.presliding_share import Presliding
 from campaign.estimation.whole_model import METHOD, ModelFit, moved_with
-from campaign.experiments.any_motion.inverse_fit import in_presliding
+from campaign.experiments.any_motion.instrument_estimates import NORMAL_95
+from campaign.experiments.any_motion.inverse_fit import in_presliding, opened
 from campaign.experiments.whole_model.residuals import Model
 from campaign.physics.friction.unknowns import DerivedOption
-from campaign.reason import Cause, Reason
+from campaign.reason import Cause
 from campaign.text import words
 from campaign.units import in_words
 
@@ -25,8 +26,6 @@ BAND = 0.4
 """Share of the rows' rate that their low-pass passes."""
 RESOLVED = 3.0
 """Shortest duration of an effect that differs from a jump, in time constants of the low-pass."""
-NORMAL_95 = 1.96
-"""Half of a two-sided 95 % interval over its standard deviation."""
 DELAY_UNKNOWN = Cause(
     "delay unknown", "a delay of {milliseconds:.2g} ms more or less leaves it open"
 )
@@ -60,7 +59,7 @@ def with_delay(fit: ModelFit, doubt: float) -> ModelFit:
         estimates[name] = shifted_by(one, "delay", abs(moved[name]))
         if estimates[name].half_width > USELESS * abs(one.value):
             reason = DELAY_UNKNOWN(milliseconds=1e3 * doubt)
-            estimates[name] = _open(one, reason)
+            estimates[name] = opened(one, reason)
     return replace(fit, estimates=estimates)
 
 
@@ -80,12 +79,6 @@ def doubt_of_delay(delay: Estimate, again: float, sample: float, known: Estimate
     return min(doubt, instrumental)
 
 
-def _open(one: Estimate, reason: Reason) -> Estimate:
-    return Estimate.without_interval(
-        one.name, one.value, one.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
-    )
-
-
 def shifted(fit: ModelFit, other: dict[str, float], source: str, cause: Cause) -> ModelFit:
     """Add the difference of another fit as a systematic part; above `USELESS` not determined."""
     estimates = {}
@@ -95,7 +88,7 @@ def shifted(fit: ModelFit, other: dict[str, float], source: str, cause: Cause) -
         )
         if estimate.half_width > USELESS * abs(estimate.value):
             shown = in_words(other[name], one.unit, SHOWN.get(one.unit, "")).rstrip()
-            estimate = _open(one, cause(shown=shown, value=other[name]))
+            estimate = opened(one, cause(shown=shown, value=other[name]))
         estimates[name] = estimate
     return replace(fit, estimates=estimates)
 
@@ -131,7 +124,7 @@ def with_bases(fit: ModelFit, model: Model) -> ModelFit:
             lost = all(base.origin is not Origin.MEASURED for base in bases)
             if lost and estimates[each.name].origin is Origin.MEASURED:
                 reason = BASE_UNKNOWN(base=" or ".join(words(base.name) for base in bases))
-                estimates[each.name] = _open(estimates[each.name], reason)
+                estimates[each.name] = opened(estimates[each.name], reason)
     return replace(fit, estimates=estimates)
 
 
@@ -158,7 +151,7 @@ def resolved(
             reason = UNRESOLVED(
                 what=each.lasts.what, milliseconds=1e3 * takes, resolved=1e3 * shortest
             )
-            estimates[each.name] = _open(estimates[each.name], reason)
+            estimates[each.name] = opened(estimates[each.name], reason)
     return replace(fit, estimates=estimates)
 
 
@@ -174,7 +167,7 @@ def described(fit: ModelFit, model: Model) -> ModelFit:
     estimates = dict(fit.estimates)
     for each in model.numbers:
         if each.lasts is not None and estimates[each.name].origin is Origin.MEASURED:
-            estimates[each.name] = _open(estimates[each.name], reason)
+            estimates[each.name] = opened(estimates[each.name], reason)
     return replace(fit, estimates=estimates)
 
 
@@ -199,7 +192,9 @@ def derived(one: DerivedOption, values: Mapping[str, float], fit: ModelFit) -> E
     for name in slopes:
         if estimates[name].origin is not Origin.MEASURED:
             reason = FACTOR_UNKNOWN(factor=words(name), reason=estimates[name].reason)
-            return _open(Estimate.without_interval(one.name, value, one.unit, reason), reason)
+            return Estimate.without_interval(
+                one.name, value, one.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
+            )
     moved = {
         name: slope * (estimates[name].standard_error or 0.0) for name, slope in slopes.items()
     }

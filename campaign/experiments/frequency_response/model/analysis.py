@@ -17,7 +17,6 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.estimation.frequency.one_inertia import RIGID
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency.welch import Estimator
 from campaign.estimation.gate import admitted, admitted_together, refused
 from campaign.estimation.intervals import MODEL_MISFIT
 from campaign.experiments.frequency_response.model.axis_numbers import by_rule, odd_distortion
@@ -45,16 +44,15 @@ from campaign.experiments.frequency_response.model.validation_figures import (
     validation_tables,
 )
 from campaign.experiments.interface import Model, TestData
-from campaign.experiments.responses.signals import Excited, usable
-from campaign.experiments.responses.sources import Reading, sources
+from campaign.experiments.responses.signals import ResponseOptions, usable
+from campaign.experiments.responses.sources import sources
 from campaign.experiments.responses.tables import distortion_tables, sources_table
 from campaign.experiments.shared.recorded_motion import validation_of
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, known_uncertainty
-from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.result import Finding, Result
 from campaign.text import words
-from campaign.units import Frequency, Time
+from campaign.units import Frequency
 
 LOUDER = "excite with more torque, or record longer, around the antiresonance and the resonance"
 AMPLITUDES = "measure at a second amplitude, half of this or twice as much"
@@ -85,19 +83,9 @@ APPENDAGE = {
 """Keys of the bench for an elastic part that the sensor sees only through the load."""
 
 
-class FrequencyResponseOptions(Options):
+class FrequencyResponseOptions(ResponseOptions):
     """Options of a frequency response."""
 
-    excited: Excited = "auto"
-    """input: no loop acts on the torque; reference: a loop makes the torque, and the command is the
-    external input of the loop; auto: by the trials' modes."""
-    estimator: Estimator = "H1"
-    """Estimator for torques without a loop: H1 (noise on the rate), H2 (on the torque), Hv (on
-    both)."""
-    resolution: Frequency | None = Field(default=None, gt=0)
-    """Resolution of averaged spectra; absent: a segment is a sixteenth of all samples."""
-    period: Time | None = Field(default=None, gt=0)
-    """Period of a multisine in recordings without its command; absent: that of the command."""
     lowest: Frequency = Field(default=0.0, ge=0)
     """Lowest fitted frequency; friction distorts responses below it."""
     highest: Frequency = Field(default=1e5, gt=0)
@@ -112,8 +100,7 @@ class FrequencyResponseOptions(Options):
 def identified(data: TestData) -> Result:
     """Modes, margins and inertias. Raises ValueError if no trial gives a response."""
     options: FrequencyResponseOptions = data.model
-    how = Reading(options.excited, options.estimator, options.resolution, options.period)
-    measured, remarks = sources(data.trials, data.bench, how)
+    measured, remarks = sources(data.trials, data.bench, options)
     if not measured:
         raise ValueError(" ".join(dict.fromkeys(remarks)) or "no trial gives a response")
     band = Band(options.lowest, options.highest, options.order)
@@ -125,7 +112,7 @@ def identified(data: TestData) -> Result:
     parameters = tuple(_parameters(two_masses, best or fitted[0]))
     correlations = _correlations(two_masses, parameters)
     fits = tuple(models(fitted, two_masses, band))
-    validation = validated(data.trials, validation_of(data, usable), data.bench, how, fits)
+    validation = validated(data.trials, validation_of(data, usable), data.bench, options, fits)
     tables = (
         sources_table([each.source for each in fitted]),
         *masses_table(two_masses),
@@ -174,7 +161,8 @@ def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:
         reason = few or told.reason
         if told.drive is not None:
             reason = MODEL_MISFIT(why=told.drive.misfit)
-        local = _local_of_axis(told, best)
+        odd = 0.0 if few else odd_distortion(best.source)  # extrema have friction's part already
+        local = {name: by_rule(each, odd) for name, each in _local(told, best).items()}
         for name, meaning, unit, advice in MEANINGS:
             nothing = Estimate.without_interval(name, math.nan, unit, reason)
             estimate = admitted(local.get(name, nothing))
@@ -211,12 +199,6 @@ def _local(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
     if side == "motor" or told.places.get(side) == "motor":
         estimates["antiresonance"] = mode.antiresonance
     return {name: replace(each, name=name) for name, each in estimates.items()}
-
-
-def _local_of_axis(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
-    """Numbers of `_local` with friction's part; extrema include it already."""
-    odd = 0.0 if too_few(best.source) else odd_distortion(best.source)
-    return {name: by_rule(each, odd) for name, each in _local(told, best).items()}
 
 
 def _findings(found: Sequence[FrequencyFit], parameters: Sequence[Parameter]) -> Iterator[Finding]:

@@ -20,8 +20,13 @@ from campaign.estimation.frequency.two_mass_model import Side
 from campaign.experiments.frequency_response.model.frequency_fit import Band, FrequencyFit, Masses
 from campaign.experiments.frequency_response.model.tables import drive_name
 from campaign.experiments.interface import TrialData
-from campaign.experiments.responses.signals import Signals, signals, whole_stretches
-from campaign.experiments.responses.sources import Reading, Source, fitted_part, sources
+from campaign.experiments.responses.signals import (
+    ResponseOptions,
+    Signals,
+    signals,
+    whole_stretches,
+)
+from campaign.experiments.responses.sources import Source, fitted_part, sources
 from campaign.physics.bench import Bench
 from campaign.reason import Reason
 from campaign.signals import MultiSine
@@ -132,7 +137,7 @@ def validated(
     fitted: Sequence[TrialData],
     unseen: Sequence[TrialData],
     bench: Bench,
-    how: Reading,
+    how: ResponseOptions,
     fits: Sequence[Model],
 ) -> Validation:
     """Compare models with unseen responses and with their own recordings.
@@ -210,7 +215,7 @@ def _predicted(
     measured: MeasuredResponse,
     unseen: Sequence[TrialData],
     bench: Bench,
-    how: Reading,
+    how: ResponseOptions,
 ) -> Prediction | None:
     part = measured.between(*model.band).at(slice(None, None, source.every))
     if len(part.frequency) < FEWEST_LINES:
@@ -227,7 +232,7 @@ def _predicted(
 
 
 def _own(
-    fitted: Sequence[TrialData], bench: Bench, how: Reading, fits: Sequence[Model]
+    fitted: Sequence[TrialData], bench: Bench, how: ResponseOptions, fits: Sequence[Model]
 ) -> Iterator[tuple[Model, Estimate]]:
     for model in fits:
         trials = [each for each in fitted if each.trial.number in model.source.trials]
@@ -237,7 +242,7 @@ def _own(
 
 
 def _simulated(
-    trials: Sequence[TrialData], bench: Bench, how: Reading, model: Model
+    trials: Sequence[TrialData], bench: Bench, how: ResponseOptions, model: Model
 ) -> list[Simulated]:
     """Outputs simulated from the recorded torque, beside the recorded ones; short stretches are
     left out.
