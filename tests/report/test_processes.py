@@ -17,7 +17,7 @@ import pytest
 
 from campaign.api.analysis import TestAnalysis, analyse_run
 from campaign.archive.layout.journal_summary import Lines, read_lines
-from campaign.archive.reading import sealed_run, summary
+from campaign.archive.reading import sealed_run, summarise
 from campaign.archive.reading.open_run import open_run
 from campaign.experiments import experiments
 from campaign.report import processes
@@ -149,7 +149,7 @@ def test_the_journal_is_parsed_once_for_a_report(
         parsed.append(content)
         return read_lines(content, lean=lean)
 
-    for module in (sealed_run, summary):
+    for module in (sealed_run, summarise):
         monkeypatch.setattr(module, "read_lines", counted)
     run = open_run(archive)
     document_of(run, experiments())
