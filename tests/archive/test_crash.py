@@ -23,7 +23,7 @@ from campaign.recording import Ending, Outcome
 CHILD = """
 import sys
 from pathlib import Path
-from campaign.archive import RunStatus
+from campaign.archive.layout.run_status import RunStatus
 writer, trials = kit.begin(Path(sys.argv[1]), 399)
 print("created", flush=True)
 for trial in trials[: int(sys.argv[2])]:

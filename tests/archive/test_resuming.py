@@ -260,7 +260,8 @@ def test_what_has_ended_or_is_no_run_is_refused(tmp_path, kit):
 @pytest.mark.slow
 def test_one_process_at_a_time_writes_a_run(tmp_path, kit):
     writer, trials = begin(tmp_path, kit)
-    program = "import sys; from pathlib import Path; from campaign.archive import RunWriter\n"
+    program = "import sys; from pathlib import Path\n"
+    program += "from campaign.archive.writing.writer import RunWriter\n"
     program += "from campaign.archive.layout.journal import RunResumed\n"
     program += f"RunWriter.resume(Path(sys.argv[1]), RunResumed(at={RESUMED.at!r}))"
     command = [sys.executable, "-c", program, str(writer.folder)]
@@ -279,7 +280,9 @@ def test_one_process_at_a_time_writes_a_run(tmp_path, kit):
 WEAR = """
 import sys
 from pathlib import Path
-from campaign.archive import RunStatus, RunWriter, find_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.run_list import find_run
+from campaign.archive.writing.writer import RunWriter
 results = Path(sys.argv[1])
 trials = [kit.make_trial(number) for number in range(1, 1001)]
 print("ready", flush=True)
@@ -329,7 +332,10 @@ def test_two_hundred_kills_while_resuming_or_sealing_lose_nothing(tmp_path, kit)
 STEPS = """
 import json, os, shutil, sys
 from pathlib import Path
-from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
+from campaign.archive.layout.run_status import RunStatus
+from campaign.archive.reading.run_list import find_run, list_runs
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.writing.writer import RunWriter
 from campaign.archive.writing import seal_run
 from campaign.archive.writing import unseal_run
 template, results = Path(sys.argv[1]), Path(sys.argv[2])

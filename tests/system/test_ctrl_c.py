@@ -98,7 +98,7 @@ def test_at_some_instants(tmp_path: Path, seed: int, times: int) -> None:
 SLOW_TO_BEGIN = """
 import os, signal, time
 from campaign import __main__, interrupts
-from campaign.archive import RunWriter
+from campaign.archive.writing.writer import RunWriter
 create = RunWriter.create.__func__
 def interrupted(cls, *arguments):
     create(cls, *arguments)
