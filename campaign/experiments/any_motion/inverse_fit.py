@@ -220,10 +220,10 @@ def in_presliding(one: Estimate, found: Presliding, *, corrected: bool = False) 
             return one
         change = found.values[one.name] - one.value
         return shifted_by(moved_by(one, change) if corrected else one, PRESLIDING, abs(change))
-    return opened(one, HARDLY_SLIDES(percent=100.0 * found.share, reach=found.reach))
+    return undetermined(one, HARDLY_SLIDES(percent=100.0 * found.share, reach=found.reach))
 
 
-def opened(one: Estimate, reason: Reason) -> Estimate:
+def undetermined(one: Estimate, reason: Reason) -> Estimate:
     """The estimate as not determined: its value without an interval."""
     return Estimate.without_interval(
         one.name, one.value, one.unit, reason, method=one.method, origin=Origin.NOT_DETERMINED
@@ -387,7 +387,7 @@ def _without_shares(
     if not shares:
         return dict(estimates)
     return {
-        name: opened(one, BENDS())
+        name: undetermined(one, BENDS())
         if name in shares or name.startswith(("coulomb", "viscous"))
         else one
         for name, one in estimates.items()

@@ -15,7 +15,7 @@ from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.presliding_share import Presliding
 from campaign.estimation.whole_model import METHOD, ModelFit, moved_with
 from campaign.experiments.any_motion.instrument_estimates import NORMAL_95
-from campaign.experiments.any_motion.inverse_fit import in_presliding, opened
+from campaign.experiments.any_motion.inverse_fit import in_presliding, undetermined
 from campaign.experiments.whole_model.residuals import Model
 from campaign.physics.friction.unknowns import DerivedOption
 from campaign.reason import Cause
@@ -59,7 +59,7 @@ def with_delay(fit: ModelFit, doubt: float) -> ModelFit:
         estimates[name] = shifted_by(one, "delay", abs(moved[name]))
         if estimates[name].half_width > USELESS * abs(one.value):
             reason = DELAY_UNKNOWN(milliseconds=1e3 * doubt)
-            estimates[name] = opened(one, reason)
+            estimates[name] = undetermined(one, reason)
     return replace(fit, estimates=estimates)
 
 
@@ -88,7 +88,7 @@ def shifted(fit: ModelFit, other: dict[str, float], source: str, cause: Cause) -
         )
         if estimate.half_width > USELESS * abs(estimate.value):
             shown = in_words(other[name], one.unit, SHOWN.get(one.unit, "")).rstrip()
-            estimate = opened(one, cause(shown=shown, value=other[name]))
+            estimate = undetermined(one, cause(shown=shown, value=other[name]))
         estimates[name] = estimate
     return replace(fit, estimates=estimates)
 
@@ -124,7 +124,7 @@ def with_bases(fit: ModelFit, model: Model) -> ModelFit:
             lost = all(base.origin is not Origin.MEASURED for base in bases)
             if lost and estimates[each.name].origin is Origin.MEASURED:
                 reason = BASE_UNKNOWN(base=" or ".join(words(base.name) for base in bases))
-                estimates[each.name] = opened(estimates[each.name], reason)
+                estimates[each.name] = undetermined(estimates[each.name], reason)
     return replace(fit, estimates=estimates)
 
 
@@ -151,7 +151,7 @@ def resolved(
             reason = UNRESOLVED(
                 what=each.lasts.what, milliseconds=1e3 * takes, resolved=1e3 * shortest
             )
-            estimates[each.name] = opened(estimates[each.name], reason)
+            estimates[each.name] = undetermined(estimates[each.name], reason)
     return replace(fit, estimates=estimates)
 
 
@@ -167,7 +167,7 @@ def described(fit: ModelFit, model: Model) -> ModelFit:
     estimates = dict(fit.estimates)
     for each in model.numbers:
         if each.lasts is not None and estimates[each.name].origin is Origin.MEASURED:
-            estimates[each.name] = opened(estimates[each.name], reason)
+            estimates[each.name] = undetermined(estimates[each.name], reason)
     return replace(fit, estimates=estimates)
 
 
