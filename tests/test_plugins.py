@@ -18,7 +18,10 @@ from typing import Annotated, Any
 import pytest
 from pydantic import Field, TypeAdapter, ValidationError
 
+from campaign import entry_points
 from campaign.backends import backends
+from campaign.entry_points import InstalledPlugins, PlugIn
+from campaign.errors import ExitCode
 from campaign.experiments import experiments
 from campaign.export import exports
 from campaign.physics.compensation import compensation_methods
@@ -335,3 +338,52 @@ def errors(adapter: TypeAdapter[Any], value: Any) -> list[tuple[Any, ...]]:
     with pytest.raises(ValidationError) as caught:
         adapter.validate_python(value)
     return [(e["type"], e["loc"], e["msg"]) for e in caught.value.errors()]
+
+
+PLUG_IN = PlugIn("campaign.backends", "greasy", "Greasy", "1.2", "greasy:BACKEND", ("greasy",))
+
+
+def raised(code: str, module: str) -> BaseException:
+    """The error that the function `fail` of a module raises."""
+    names: dict[str, Any] = {"__name__": module, "json": json}
+    exec(code, names)
+    try:
+        names["fail"]()
+    except (Exception, SystemExit) as error:  # noqa: BLE001 (the error is the result)
+        return error
+    raise AssertionError("no error")
+
+
+@pytest.mark.parametrize(
+    ("code", "module", "blames"),
+    [
+        ("def fail(): raise ValueError", "greasy.rig", True),
+        ("def fail(): raise SystemExit(0)", "greasy", True),
+        ("def fail(): json.loads('')", "greasy", True),  # in a library that it calls
+        ("def fail(): json.loads('')", "campaign.cli.main", False),
+        ("def fail(): raise SystemExit(0)", "typer.core", False),
+        ("def fail(): raise ValueError", "greasy_too", False),
+    ],
+)
+def test_a_plug_in_is_blamed_for_errors_in_and_below_it(
+    code: str, module: str, blames: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(entry_points, "installed", lambda: InstalledPlugins((PLUG_IN,), ()))
+    assert entry_points.blamed(raised(code, module)) == (PLUG_IN if blames else None)
+
+
+def test_an_error_of_a_plug_in_names_its_package(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(entry_points, "installed", lambda: InstalledPlugins((PLUG_IN,), ()))
+
+    def app(**_: object) -> None:
+        raise raised("def fail(): raise ValueError('no grease')", "greasy")
+
+    main = importlib.import_module("campaign.cli.main")
+    monkeypatch.setattr(main, "app", app)
+    with pytest.raises(SystemExit) as ended:
+        main.main()
+    assert ended.value.code == ExitCode.LIMIT_OR_FAULT
+    said = capsys.readouterr().err
+    assert "the package Greasy 1.2 failed: ValueError: no grease" in said

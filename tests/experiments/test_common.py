@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.shared.common import with_changes
+from campaign.experiments.shared.common import numbered, with_changes
 from campaign.experiments.shared.friction_models import resolved
 from campaign.physics.bench import Bench
+from campaign.result import Figure, Result, Table
 
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
 
@@ -58,3 +59,14 @@ def test_a_difference_no_larger_than_the_engine_s_error_is_0_and_says_so() -> No
     assert (found.value, found.low, found.high) == (0.0, None, None)
     assert found.reason.code == "not resolved by the simulation"
     assert "0.002" in found.reason.text
+
+
+@pytest.mark.parametrize(("places", "keys"), [(0, []), (1, ["map"]), (2, ["map-1", "map-2"])])
+def test_keys_of_several_places_get_the_number_of_the_place(places: int, keys: list[str]) -> None:
+    one = Result(
+        tables=(Table("map", "Friction", (), ()),),
+        figures=(Figure("map", "Friction", "", "", ()),),
+    )
+    result = numbered([one] * places)
+    assert [each.key for each in result.tables] == keys
+    assert [each.key for each in result.figures] == keys
